@@ -89,8 +89,8 @@ def near_field(
     mirrored: Sequence[bool] = (False, False),
 ) -> Callable[[Floats], Floats]:
     """Return a function that computes int w(y) / |x - y| dA of fields w (k, ny, nx) at the nodes of
-    a grid with shape (ny, nx) and spacing (dy, dx) in metres. `mirrored` adds the mirror images
-    about the first line of nodes along y and x.
+    a grid with shape (ny, nx) and spacing (dy, dx) in m. `mirrored` adds the mirror images about
+    the first line of nodes along y and x.
     """
     whole = [2 * n - 1 if image else n for n, image in zip(shape, mirrored, strict=True)]
     padded = [fft.next_fast_len(2 * n - 1, real=True) for n in whole]
@@ -111,7 +111,7 @@ def near_field(
 
 
 def inverse_distance(x: Floats, y: Floats, size: tuple[float, float]) -> Floats:
-    """Return int 1/r dA (...), in metres, over rectangles of one size (x, y) centred at x, y (...).
+    """Return int 1/r dA (...), in m, over rectangles of one size (x, y) centred at x, y (...).
 
     It is x asinh(y/x) + y asinh(x/y) between the corners (Durand, Electrostatique, vol. 1 (1964)).
     """

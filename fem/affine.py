@@ -199,8 +199,8 @@ def line_solution(
     solver: str = "auto",
     fluid_share: float = 0.0,
 ) -> Complex:
-    """Return the steady state (n_free,) of a full body at one line, in metres, for `weights` (q,)
-    of its matrices and a force (n_free,) in N.
+    """Return the steady state (n_free,) of a full body at one line, in m, for `weights` (q,) of its
+    matrices and a force (n_free,) in N.
 
     The added mass F of a fluid can only be applied. P = A - w F + E is factorised, where E is the
     equivalent added mass of the bending waves of this line, `fluid_share` of the body's own mass.

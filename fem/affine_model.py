@@ -52,7 +52,7 @@ def steady_states(
 def steady_outputs(
     model: AffineModel, weights: Complex, shares: Floats, lines: Iterable[int], size: int = 0
 ) -> Complex:
-    """Return the steady outputs (k, p) in metres; for the arguments see `steady_states`."""
+    """Return the steady outputs (k, p) in m; for the arguments see `steady_states`."""
     states = steady_states(model, weights, shares, lines, size)
     outputs = np.tensordot(shares, model.outputs[..., : states.shape[1]], 1)
     return np.asarray(states @ outputs.T, np.complex128)

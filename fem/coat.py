@@ -56,7 +56,7 @@ class Coat:
     Parameters
     ----------
     materials : materials of the layers, from the surface downwards
-    thicknesses : thicknesses of the layers in metres, finite and above 0
+    thicknesses : thicknesses of the layers in m, finite and above 0
     facets : name of a facet set, or nodes (e, a)
 
     Raises
@@ -107,8 +107,8 @@ class Surface:
 class Edges:
     """Edges across which a coat bends, one entry per side h: the `facet` (h,) and number of the
     `edge` (h,). At points q, the same for both sides: the `slopes` (h, q, a, d) of the shape
-    functions, unit `conormals` (h, q, i) out of the facet, `lengths` (h, q) in metres, and the
-    rotation `outwards` (h, q, 3 a) of the normal. `sides` (h,) is 2 at a plane of symmetry, else 1.
+    functions, unit `conormals` (h, q, i) out of the facet, `lengths` (h, q) in m, and the rotation
+    `outwards` (h, q, 3 a) of the normal. `sides` (h,) is 2 at a plane of symmetry, else 1.
     """
 
     facet: Ints

@@ -220,7 +220,7 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
 
 
 def internal_force(part: Part, u: Floats) -> Floats:
-    """Return internal nodal forces (n, 3) in N at the displacement u (n, 3) in metres."""
+    """Return internal nodal forces (n, 3) in N at the displacement u (n, 3) in m."""
     F, E = deformation(part, u)
     return spread_stress(part, stress(part, E) @ F)
 

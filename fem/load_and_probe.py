@@ -64,7 +64,7 @@ def _forces(mesh: TetMesh, facets: str | Ints, values: Floats) -> sparse.csr_arr
 
 
 def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
-    """Return the quadrature points (k q, 3) of `load_operator`, in metres."""
+    """Return the quadrature points (k q, 3) of `load_operator`, in m."""
     nodes = facet_set(mesh, facets)
     N = shape_functions(triangle_rule()[0], nodes.shape[1])
     return np.einsum("qa,eai->eqi", N, mesh.points[nodes]).reshape(-1, 3)
@@ -90,7 +90,7 @@ def probe_operator(
     mesh : TetMesh
     points : (p, 2) or (p, 3) float, m
     facets : name of a facet set, or nodes (e, a)
-    patch : standard deviation in metres of the Gaussian weights of normals around a point, or 0
+    patch : standard deviation in m of the Gaussian weights of normals around a point, or 0
 
     Returns
     -------
@@ -133,7 +133,7 @@ def _inwards(mesh: TetMesh, nodes: Ints, N: Floats, normals: Floats) -> sparse.c
 def surface_frame(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """Return places (p, 3) in metres on a surface, and unit normals (p, 3) out of the body there.
+    """Return places (p, 3) in m on a surface, and unit normals (p, 3) out of the body there.
 
     Arguments and errors are those of `probe_operator`.
     """
@@ -213,7 +213,7 @@ def curved_coordinates(elements: Floats, barycentric: Floats, points: Floats) ->
 
 
 def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> Bools:
-    """Return a mask (p,) of the points (p, 2) in metres that `probe_operator` accepts."""
+    """Return a mask (p,) of the points (p, 2) in m that `probe_operator` accepts."""
     return _facets_below(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
 
 
@@ -305,8 +305,8 @@ def straight_coordinates(corners: Floats, point: Floats) -> Floats:
 
 
 def locate(mesh: TetMesh, points: ArrayLike) -> tuple[Ints, Floats]:
-    """Return the element (p,) that each point (p, 3) in metres lies in, and its barycentric
-    coordinates (p, 4). Raises a ValueError if a point lies outside the body.
+    """Return the element (p,) that each point (p, 3) in m lies in, and its barycentric coordinates
+    (p, 4). Raises a ValueError if a point lies outside the body.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
     owner, barycentric, inside = _elements_at(mesh, points)
@@ -317,7 +317,7 @@ def locate(mesh: TetMesh, points: ArrayLike) -> tuple[Ints, Floats]:
 
 
 def is_inside(mesh: TetMesh, points: ArrayLike) -> Bools:
-    """Return a mask (p,) of the points (p, 3) in metres that lie in the body."""
+    """Return a mask (p,) of the points (p, 3) in m that lie in the body."""
     return _elements_at(mesh, np.atleast_2d(np.asarray(points, np.float64)))[2]
 
 
@@ -349,8 +349,8 @@ def _containing(corners: Floats, low: Floats, high: Floats, point: Floats) -> tu
 
 
 def displacement_operator(mesh: TetMesh, points: ArrayLike) -> sparse.csr_array:
-    """Return the displacement operator (3 p, 3 n), component fastest, at points (p, 3) in metres
-    inside a body. Raises a ValueError if a point lies outside.
+    """Return the displacement operator (3 p, 3 n), component fastest, at points (p, 3) in m inside
+    a body. Raises a ValueError if a point lies outside.
     """
     owner, barycentric = locate(mesh, points)
     nodes = mesh.tets[owner]

@@ -84,7 +84,7 @@ def relaxing_stiffness(branches: Sequence[Branch], s: Any) -> Any:
 
 
 def branch_force(branches: Sequence[Branch], stretch: Floats) -> Any:
-    """Return the forces (n,) of branches in N for internal variables (j, n) in metres."""
+    """Return the forces (n,) of branches in N for internal variables (j, n) in m."""
     return sum(branch.K @ d for branch, d in zip(branches, stretch, strict=True))
 
 

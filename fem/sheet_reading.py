@@ -44,7 +44,7 @@ class SheetReading:
 
 def sheet_reading(mesh: TetMesh, membrane: Membrane, points: ArrayLike) -> SheetReading:
     """Return operators that read the middle plane of a meshed sheet, a `Membrane`, at points (p, 2)
-    in metres. Raises a ValueError if a point lies off the sheet.
+    in m. Raises a ValueError if a point lies off the sheet.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
     part = membrane_part(mesh, membrane)
@@ -62,8 +62,8 @@ def sheet_reading(mesh: TetMesh, membrane: Membrane, points: ArrayLike) -> Sheet
 
 
 def displacement_rows(reading: SheetReading, heights: Floats) -> sparse.csr_array:
-    """Return the displacement operator (3 p, 3 n) of bending at heights (p,) in metres above the
-    middle plane, without in-plane motion of that plane.
+    """Return the displacement operator (3 p, 3 n) of bending at heights (p,) in m above the middle
+    plane, without in-plane motion of that plane.
     """
     z, nothing = sparse.diags_array(heights), sparse.csr_array(reading.value.shape)
     x, y = (-(z @ slope) for slope in reading.slopes)
@@ -72,8 +72,8 @@ def displacement_rows(reading: SheetReading, heights: Floats) -> sparse.csr_arra
 
 
 def strain_rows(reading: SheetReading, heights: Floats, poisson: float) -> sparse.csr_array:
-    """Return the strain operator (6 p, 3 n) in 1/m of bending at heights (p,) in metres above the
-    middle plane; components xx, yy, zz, xy, xz, yz fastest.
+    """Return the strain operator (6 p, 3 n) in 1/m of bending at heights (p,) in m above the middle
+    plane; components xx, yy, zz, xy, xz, yz fastest.
     """
     z, nothing = sparse.diags_array(heights), sparse.csr_array(reading.value.shape)
     bent = _by_point([[nothing, nothing, -(z @ part)] for part in reading.curvatures])
@@ -91,7 +91,7 @@ def from_plane(poisson: float) -> Floats:
 
 def quadratic_strain_at(reading: SheetReading, u: Floats) -> Floats:
     """Return the quadratic part u_i,a u_i,b / 2 (p, 3) of the strains xx, yy and xy of the middle
-    plane at a displacement u (3 n,) in metres.
+    plane at a displacement u (3 n,) in m.
     """
     D = reading.part.D
     slopes = (D @ u.reshape(-1, 3)).reshape(-1, 2, 3)

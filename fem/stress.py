@@ -172,14 +172,14 @@ def _fit(mesh: TetMesh, patches: list[Ints], used: Ints, points: Floats) -> spar
 
 
 def _sample_places(mesh: TetMesh, used: Ints) -> Floats:
-    """Return the quadrature points (k, q, 3) of some elements (k,) in metres."""
+    """Return the quadrature points (k, q, 3) of some elements (k,) in m."""
     nodes = mesh.points[mesh.tets[used]]
     N = shape_functions(tetrahedron_rule(2)[0], nodes.shape[1])
     return np.asarray(np.einsum("qa,eai->eqi", N, nodes))
 
 
 def _size(mesh: TetMesh, patch: Ints) -> Floats:
-    """Return the mean extent (3,) of elements in metres."""
+    """Return the mean extent (3,) of elements in m."""
     return np.asarray(np.ptp(mesh.points[mesh.tets[patch, :4]], axis=1).mean(axis=0))
 
 
@@ -260,7 +260,7 @@ def solid_parts(mesh: TetMesh, material: Material | Mapping[int, Material]) -> l
 
 def nodal_strain(part: SolidPart, u: Floats, wanted: Ints | None = None) -> Floats:
     """Return the strain (w, 6, m), components xx, yy, zz, xy, xz, yz, at some or all nodes (w,) of
-    a part, for displacements u (3 n, m) in metres of all nodes.
+    a part, for displacements u (3 n, m) in m of all nodes.
     """
     nodes = part.nodes if wanted is None else part.nodes[wanted]
     number = np.full(len(part.mesh.points), -1)

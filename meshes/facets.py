@@ -14,7 +14,7 @@ Predicate = Callable[[Floats, Floats], np.ndarray]
 
 
 def geometry(mesh: TetMesh, facets: Ints) -> tuple[Floats, Floats]:
-    """Return centroids (k, 3) in metre and outward unit normals (k, 3) of straight facets."""
+    """Return centroids (k, 3) in m and outward unit normals (k, 3) of straight facets."""
     a, b, c = (mesh.points[facets[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     return (a + b + c) / 3, normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -76,9 +76,7 @@ def visible_from_above(mesh: TetMesh) -> np.ndarray:
 
 
 def heights_over(triangles: Floats, places: Floats) -> Floats:
-    """Return the heights (m,) in metre of triangles (m, 3, 3) above places (m, 2) or (2,), else
-    -inf.
-    """
+    """Return the heights (m,) in m of triangles (m, 3, 3) above places (m, 2) or (2,), else -inf."""
     flat = triangles[..., :2] - places[..., None, :]
     x, y = flat[..., 0], flat[..., 1]
     share = np.stack(

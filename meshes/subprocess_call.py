@@ -35,8 +35,8 @@ def call(function: Callable[..., T], *args: object, timeout: float, memory: int 
     ----------
     function : defined at the top level of an importable module
     args : its arguments; these and the result are pickled
-    timeout : float, second; the process ends even if the caller is gone
-    memory : int, byte, where the platform supports it; 0 for no limit
+    timeout : float, s; the process ends even if the caller is gone
+    memory : int, bytes, where the platform supports it; 0 for no limit
 
     Raises
     ------

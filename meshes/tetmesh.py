@@ -42,12 +42,12 @@ class TetMesh:
 
     Parameters
     ----------
-    points : (n, 3) float, metre
+    points : (n, 3) float, m
     tets : (m, 4) or (m, 10) int, node numbers in VTK order; inverted tetrahedra are reordered
     region : (m,) int, number of the material of each tetrahedron; 0 by default
     region_names : name of each region number that has one
     facets : name -> (k, 3) or (k, 6) int, boundary facets as seen from outside
-    unmoved : (n, 3) float, metre, points before nodes were moved; their edges group the elements
+    unmoved : (n, 3) float, m, points before nodes were moved; their edges group the elements
 
     Raises a MeshError if shapes or node numbers do not fit, a point is not finite or further away
     than `FURTHEST`, or a tetrahedron is flat.
@@ -103,7 +103,7 @@ class TetMesh:
         return 3 * len(self.points)
 
     def to_pyvista(self) -> pv.UnstructuredGrid:
-        """Return the mesh as a pyvista grid, in metre.
+        """Return the mesh as a pyvista grid, in m.
 
         Regions are cell data. Each facet set that is not empty is field data, such as "facets:top".
         """
@@ -121,7 +121,7 @@ class TetMesh:
 
 
 def corner_volumes(points: Floats, tets: Ints) -> Floats:
-    """Return the signed volume (m,) in cubic metre of the straight-edged tetrahedra."""
+    """Return the signed volume (m,) in m3 of the straight-edged tetrahedra."""
     a, b, c, d = (points[tets[:, i]] for i in range(4))
     return np.einsum("ei,ei->e", np.cross(b - a, c - a), d - a) / 6
 
@@ -263,7 +263,7 @@ def _facets(name: str, nodes: ArrayLike, points: Floats, tets: Ints) -> Ints:
 
 def _check(points: Floats, tets: Ints) -> None:
     if points.ndim != 2 or points.shape[1] != 3:
-        raise MeshError(f"points have shape {points.shape}; give (n, 3) coordinates in metre")
+        raise MeshError(f"points have shape {points.shape}; give (n, 3) coordinates in m")
     if tets.ndim != 2 or tets.shape[1] not in (4, 10) or not len(tets):
         raise MeshError(f"tets have shape {tets.shape}; give (m, 4) or (m, 10) node numbers, m > 0")
     check_finite(points)

@@ -42,13 +42,13 @@ def small() -> float:
 
 
 def place_name(place: Floats) -> str:
-    """Format a place (2,) or (3,) in metre as text, in mm."""
+    """Format a place (2,) or (3,) in m as text, in mm."""
     return f"({', '.join(f'{1e3 * x:.4g}' for x in place)})"
 
 
 def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) -> None:
-    """Draw values (k, p) along x (k,), a curve for each probe at places (p, 2) in metre, from dark
-    to bright. The legend names at most `MOST_NAMED` curves.
+    """Draw values (k, p) along x (k,), a curve for each probe at places (p, 2) in m, from dark to
+    bright. The legend names at most `MOST_NAMED` curves.
     """
     import matplotlib as mpl
 

@@ -48,7 +48,7 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     Parameters
     ----------
     pressure : MovingPressure
-    probes : (p, 2) float, metre
+    probes : (p, 2) float, m
     times : (t,) float, s, equally spaced
 
     Returns
@@ -63,9 +63,7 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     """
     probes = np.array(probes, np.float64)
     if probes.ndim != 2 or probes.shape[1] != 2:
-        raise ValueError(
-            f"probes have shape {probes.shape}; give positions of shape (p, 2) in metre"
-        )
+        raise ValueError(f"probes have shape {probes.shape}; give positions of shape (p, 2) in m")
     started = time.perf_counter()
     parts = oversampling(highest_line(pressure), step(times))
     stimulation = low_pass(partial(pressure, probes), times, parts)

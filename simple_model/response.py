@@ -39,10 +39,10 @@ class Effort:
     """Cost of a response, and how it was computed.
 
     `seconds` by phase; `dofs` and number of `steps` or lines that were solved; `peak_memory` in
-    bytes; element size `h` in metre and time step `dt` in s, 0 if there is none; SHA-256 of the
-    `mesh`; `solver`; `estimate` of the relative error of the reduction; relative
-    `energy_imbalance`; share of the losses that was `radiated` through absorbing boundaries;
-    `versions` of the software; `warnings`, sentences on the limits of the result.
+    bytes; element size `h` in m and time step `dt` in s, 0 if there is none; SHA-256 of the `mesh`;
+    `solver`; `estimate` of the relative error of the reduction; relative `energy_imbalance`; share
+    of the losses that was `radiated` through absorbing boundaries; `versions` of the software;
+    `warnings`, sentences on the limits of the result.
     """
 
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -73,7 +73,7 @@ class Response:
     ----------
     model : str, name of the model
     times : (t,) float, s, equally spaced
-    probes : (p, 2) float, metre
+    probes : (p, 2) float, m
     values : (t, p) float, in the unit of the quantity
     quantity : a name in `quantities.QUANTITIES`; normal motion is positive into the body
     effort : Effort
@@ -88,7 +88,7 @@ class Response:
     >>> response = Response(model="made", times=times, probes=[[0.0, 0.0]], values=x[:, None])
     >>> response
     <Response of made: displacement into the body (1,000 times, 1 probe) from 0 to 99.9 ms, ...>
-    >>> lines(response, [140.0]).round(9)  # metre
+    >>> lines(response, [140.0]).round(9)  # m
     array([[1.e-06]])
     """
 

@@ -30,7 +30,7 @@ COSINES = {
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spectrum:
     """Amplitude spectrum: `frequencies` (f,) in Hz, `amplitudes` (f, p) in the unit of the
-    `quantity`, and `probes` (p, 2) in metre.
+    `quantity`, and `probes` (p, 2) in m.
     """
 
     frequencies: Floats
@@ -69,7 +69,7 @@ class Lines:
     names : (f,) str, such as "f_AM" or "2f_d-f_AM"
     frequencies : (f,) float, Hz
     amplitudes : (f, p) complex, a of Re a exp(2 pi i f t), in the unit of the quantity
-    probes : (p, 2) float, metre
+    probes : (p, 2) float, m
     quantity : name of one of `quantities.QUANTITIES`
     """
 

@@ -34,8 +34,7 @@ MEASURED_FREQUENCY = 200.0  # Hz
 
 
 def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
-    """Return the detection threshold (...) of displacement in metre, peak, at frequencies (...) in
-    Hz.
+    """Return the detection threshold (...) of displacement in m, peak, at frequencies (...) in Hz.
 
     The area is "focal_spot", 0.58 cm2, or "large_contactor", 2.9 cm2, as in the measurements. NaN
     below 10 and above 1000 Hz, where the curve does not apply.

@@ -10,4 +10,4 @@ Bools = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
-Points = tuple[tuple[float, float], ...]  # metre
+Points = tuple[tuple[float, float], ...]  # m

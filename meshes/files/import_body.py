@@ -60,15 +60,15 @@ def body_from_file(
     Parameters
     ----------
     path : surface or mesh file in one of `FORMATS`
-    h : float, metre, edge length in the middle of the palm
+    h : float, m, edge length in the middle of the palm
     unit : unit of the coordinates in the file: m, cm, mm, um or in
     up : axis of the file that points to the device: +x, -x, ... -z
     inner : files of closed surfaces inside it, such as bones. Each becomes a region with the name
         of its file.
-    clip : least and greatest x, then least and greatest y, metre from the middle of the palm
+    clip : least and greatest x, then least and greatest y, m from the middle of the palm
     keep_largest : keep only the largest of several separate pieces
     cap : close holes of a surface whose edges lie in a plane, such as an open wrist
-    timeout : float, second, limit for the mesher
+    timeout : float, s, limit for the mesher
     say : receives a sentence on each finding and change
     progress : receives the name of each phase, and 0
 
@@ -161,7 +161,7 @@ def _sound_surface(
     keep_largest: bool = False,
     cap: bool = False,
 ) -> Surface:
-    """Surface in a file, in metre, rotated, repaired and checked."""
+    """Surface in a file, in m, rotated, repaired and checked."""
     say(f"read {len(contents.triangles):,} triangles and {len(contents.points):,} points")
     points = contents.points * scale @ rotation_to_z(up).T
     surface, notes = repaired(points, contents.triangles, keep_largest=keep_largest, cap=cap)

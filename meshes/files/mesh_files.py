@@ -50,7 +50,7 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
 
 
 def scale_of(unit: str) -> float:
-    """Return the size of a unit in metre."""
+    """Return the size of a unit in m."""
     if unit not in UNITS:
         raise MeshError(f"unit '{unit}' is unknown; use one of {', '.join(UNITS)}")
     return UNITS[unit]
@@ -89,7 +89,7 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
 
 
 def mesh_of(contents: Contents, scale: float) -> TetMesh:
-    """Return the mesh in a file in metre; `scale` is the size of its unit."""
+    """Return the mesh in a file in m; `scale` is the size of its unit."""
     return TetMesh(
         points=contents.points * scale, tets=contents.tets, region=contents.region,
         region_names=contents.names, facets=contents.facets,

@@ -27,7 +27,7 @@ PADS = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: x of the finger roots
 
 @dataclass(frozen=True, kw_only=True)
 class Palm:
-    """Size and relief of a palm, in metre. The defaults are those of an adult.
+    """Size and relief of a palm, in m. The defaults are those of an adult.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Palm:
 
 
 def level_set(palm: Palm, points: ArrayLike) -> Floats:
-    """Return F (n,) in metre at points (n, 3), negative inside; near the surface, the distance."""
+    """Return F (n,) in m at points (n, 3), negative inside; near the surface, the distance."""
     return _field(palm, np.asarray(points, np.float64))[0]
 
 
@@ -88,7 +88,7 @@ def gradient(palm: Palm, points: ArrayLike) -> Floats:
 
 
 def rise(palm: Palm, places: Floats) -> Floats:
-    """Return the height (...,) in metre by which the cup raises places (..., 2)."""
+    """Return the height (...,) in m by which the cup raises places (..., 2)."""
     return np.asarray(places**2 @ _bend(palm))
 
 

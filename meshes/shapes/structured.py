@@ -31,7 +31,7 @@ SECTORS = 8  # of a disc: no element crosses x = 0 or y = 0
 CLOSEST = 0.4  # of a cell: a plane replaces grid lines nearer than this
 MOST_UNKNOWNS = 3_000_000  # degrees of freedom whose factorisation fits in a workstation
 
-Lines = tuple[Floats, Floats, Floats]  # metre, increasing, along x, y and z
+Lines = tuple[Floats, Floats, Floats]  # m, increasing, along x, y and z
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +40,9 @@ class Grading:
 
     Parameters
     ----------
-    radius : float, metre, half width of the square of fine cells
+    radius : float, m, half width of the square of fine cells
     growth : float, size ratio of neighbouring cells outside the square and downwards
-    coarsest : float, metre, largest cell
+    coarsest : float, m, largest cell
     """
 
     radius: float
@@ -68,11 +68,11 @@ def sheet(
 
     Parameters
     ----------
-    width, height, thickness : float, metre, along x, y and z
-    h : float, metre, largest side of a cell in the plane
+    width, height, thickness : float, m, along x, y and z
+    h : float, m, largest side of a cell in the plane
     layers : int, elements through the thickness
     order : 1 or 2, four- or ten-node tetrahedra
-    planes : places in metre along x and along y where grid lines must lie
+    planes : places in m along x and along y where grid lines must lie
 
     Returns
     -------
@@ -101,8 +101,8 @@ def block(
 
     Parameters
     ----------
-    lengths : three floats, metre, along x, y and z
-    h : float, metre, largest side of a cell, under the focus if graded
+    lengths : three floats, m, along x, y and z
+    h : float, m, largest side of a cell, under the focus if graded
     grading : growth of cells away from the focus; None for equal cells
     order : 1 or 2, four- or ten-node tetrahedra
 
@@ -146,7 +146,7 @@ def middle_plane(mesh: TetMesh) -> Ints:
 
 def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = ()) -> TetMesh:
     """Return ten-node tetrahedra of a cylinder below z = 0 on rings of triangles; h is the largest
-    edge along a radius and downwards, and `planes` are depths, in metre, where element layers end.
+    edge along a radius and downwards, and `planes` are depths, in m, where element layers end.
     """
     for name, length in (("diameter", diameter), ("thickness", thickness), ("h", h)):
         if not 0 < length < np.inf:
@@ -183,7 +183,7 @@ def _rings(rings: int) -> tuple[Floats, Ints]:
 
 
 def graded_axis(length: float, h: float, grading: Grading) -> Floats:
-    """Return grid lines (n,) in metre from 0 to a length: equal cells of size h, then growing ones.
+    """Return grid lines (n,) in m from 0 to a length: equal cells of size h, then growing ones.
 
     >>> graded_axis(0.05, 0.01, Grading(radius=0.02, growth=2.0)).tolist()
     [0.0, 0.01, 0.02, 0.05]
@@ -219,14 +219,14 @@ def with_planes(line: Floats, planes: Iterable[float]) -> Floats:
 
 
 def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
-    """Return tetrahedra on grid lines along x, y and z, in metre.
+    """Return tetrahedra on grid lines along x, y and z, in m.
 
     Diagonals alternate between cells. A grid of mirrored lines and an even number of cells has the
     mirror symmetries of the rectangle.
 
     Parameters
     ----------
-    x, y, z : increasing, metre
+    x, y, z : increasing, m
     order : 1 or 2, four- or ten-node tetrahedra
 
     Returns
@@ -258,9 +258,9 @@ def extruded(plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int
 
     Parameters
     ----------
-    plane : (n, 2) float, metre
+    plane : (n, 2) float, m
     triangles : (k, 3) int, nodes of the plane
-    z : increasing heights of the layers, metre
+    z : increasing heights of the layers, m
     order : 1 or 2, four- or ten-node tetrahedra
     """
     ranked = np.sort(np.asarray(triangles), axis=1)  # the same order everywhere: neighbours conform

@@ -30,16 +30,14 @@ def rotation_to_z(up: str) -> Floats:
 
 
 def align(surface: Surface) -> tuple[Surface, Floats]:
-    """Return the surface with its top above the widest circle at the origin, and its shift (3,),
-    metre.
-    """
+    """Return the surface with its top above the widest circle at the origin, and its shift (3,), m."""
     x, y, _ = widest_circle(surface)
     shift = -np.array([x, y, height_at(surface, x, y)])
     return Surface(points=surface.points + shift, triangles=surface.triangles), shift
 
 
 def shift_to_origin(surface: Surface) -> Floats:
-    """Return the shift (3,) in metre that brings the top of a surface to the origin.
+    """Return the shift (3,) in m that brings the top of a surface to the origin.
 
     It is 0 if the origin already lies on the top, at least 3 mm or half the radius of the widest
     circle inside the outline; otherwise it is that of `align`.
@@ -56,7 +54,7 @@ def shift_to_origin(surface: Surface) -> Floats:
 
 
 def widest_circle(surface: Surface) -> tuple[float, float, float]:
-    """Return the centre x, y and radius, metre, of the widest circle in the outline from above."""
+    """Return the centre x, y and radius, m, of the widest circle in the outline from above."""
     low, cell, depth = _outline(surface)
     # A long bar has many equal circles: take the one in the middle.
     best = np.argwhere(depth >= depth.max() - 0.5)
@@ -66,9 +64,7 @@ def widest_circle(surface: Surface) -> tuple[float, float, float]:
 
 
 def _outline(surface: Surface) -> tuple[Floats, float, Floats]:
-    """Raster of the outline: corner (2,) and cell in metre, distance (i, j) in cells from
-    outside.
-    """
+    """Raster of the outline: corner (2,) and cell in m, distance (i, j) in cells from outside."""
     from scipy.ndimage import distance_transform_edt
 
     flat = surface.points[:, :2]
@@ -87,7 +83,7 @@ def _outline(surface: Surface) -> tuple[Floats, float, Floats]:
 
 
 def height_at(surface: Surface, x: float, y: float) -> float:
-    """Return the greatest z in metre of the surface above a point of the plane."""
+    """Return the greatest z in m of the surface above a point of the plane."""
     highest = heights_over(surface.points[surface.triangles], np.array([x, y])).max()
     if highest == -np.inf:
         place = f"({1e3 * x:.4g}, {1e3 * y:.4g}) mm"
@@ -98,8 +94,8 @@ def height_at(surface: Surface, x: float, y: float) -> float:
 def clip_to_box(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]:
     """Return the closed part of a closed surface within a box, and sentences on the cuts.
 
-    `box` is the least and greatest x, then y, in metre. Of several pieces, the one below the origin
-    is kept.
+    `box` is the least and greatest x, then y, in m. Of several pieces, the one below the origin is
+    kept.
     """
     left, right, front, back = box
     if not (left < 0 < right and front < 0 < back):
@@ -144,7 +140,7 @@ def cut_to_box(surface: Surface, box: Sequence[float]) -> tuple[Surface | None, 
 
 
 def on_planes(box: Sequence[float], tolerance: float) -> Predicate:
-    """Return a predicate for `tag_boundary` of the facets on the sides of a box, in metre."""
+    """Return a predicate for `tag_boundary` of the facets on the sides of a box, in m."""
 
     def cut(centroids: Floats, normals: Floats) -> np.ndarray:
         selected = np.zeros(len(centroids), bool)

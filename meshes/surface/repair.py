@@ -77,7 +77,7 @@ def repaired(
 
     Parameters
     ----------
-    points, triangles : (n, 3) float, metre, and (k, 3) int
+    points, triangles : (n, 3) float, m, and (k, 3) int
     keep_largest : keep only the piece with the largest area
     cap : close holes whose edges lie in a plane, such as an open wrist
 
@@ -244,5 +244,5 @@ def _at(surface: Surface, side: int) -> str:
 
 
 def in_mm(place: Floats) -> str:
-    """Return a position (3,) in metre as text in mm."""
+    """Return a position (3,) in m as text in mm."""
     return "({:.4g}, {:.4g}, {:.4g}) mm".format(*(1e3 * place))

@@ -16,7 +16,7 @@ class Surface:
 
     Parameters
     ----------
-    points : (n, 3) float, metre
+    points : (n, 3) float, m
     triangles : (k, 3) int, point numbers from 0
 
     Raises a MeshError if shapes or point numbers do not fit, there is no triangle, or a point is
@@ -40,29 +40,29 @@ class Surface:
 
     @property
     def diagonal(self) -> float:
-        """Diagonal of the bounding box, metre."""
+        """Diagonal of the bounding box, m."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
 
 def volume(surface: Surface) -> float:
-    """Return the enclosed volume in cubic metre, negative if the triangles are inverted."""
+    """Return the enclosed volume in m3, negative if the triangles are inverted."""
     a, b, c = centred_corners(surface)
     return float(np.einsum("ei,ei->", np.cross(a, b), c)) / 6
 
 
 def areas_of(surface: Surface) -> Floats:
-    """Return the area (k,) in square metre of each triangle."""
+    """Return the area (k,) in m2 of each triangle."""
     a, b, c = centred_corners(surface)
     return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
 
 def area(surface: Surface) -> float:
-    """Return the total area in square metre."""
+    """Return the total area in m2."""
     return float(areas_of(surface).sum())
 
 
 def thinnest(surface: Surface) -> float:
-    """Return twice the volume over the area, metre: the thickness of a plate."""
+    """Return twice the volume over the area, m: the thickness of a plate."""
     return 2 * abs(volume(surface)) / area(surface)
 
 

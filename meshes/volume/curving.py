@@ -28,7 +28,7 @@ def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> Te
     Parameters
     ----------
     mesh : TetMesh of ten-node tetrahedra
-    level_set, gradient : functions of points (n, 3) in metre: values (n,), slopes (n, 3)
+    level_set, gradient : functions of points (n, 3) in m: values (n,), slopes (n, 3)
 
     Returns
     -------
@@ -76,7 +76,7 @@ def project_to_level_set(
 
 
 def _mean_edge(mesh: TetMesh) -> Floats:
-    """Mean edge length (n,) in metre of the elements at each node."""
+    """Mean edge length (n,) in m of the elements at each node."""
     nodes, own = mesh.tets.ravel(), edge_lengths(mesh).mean(axis=1)
     count = np.bincount(nodes, minlength=len(mesh.points))
     total = np.bincount(nodes, np.repeat(own, mesh.tets.shape[1]), len(mesh.points))

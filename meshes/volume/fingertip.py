@@ -31,9 +31,9 @@ class Fingertip:
 
     Parameters
     ----------
-    breadth, length, thickness : float, metre, along x, y and z
-    bone_breadth, bone_thickness : float, metre
-    cover, tip : float, metre, of soft tissue between the pad, or the tip, and the bone
+    breadth, length, thickness : float, m, along x, y and z
+    bone_breadth, bone_thickness : float, m
+    cover, tip : float, m, of soft tissue between the pad, or the tip, and the bone
 
     Raises a MeshError if a length is not finite and above 0, or the bone is not within the tissue.
     """
@@ -66,23 +66,23 @@ class Fingertip:
 
     @property
     def section(self) -> float:
-        """Position along y, metre, where the cylinder ends and the round end begins."""
+        """Position along y, m, where the cylinder ends and the round end begins."""
         return (self.length - self.breadth) / 2
 
     @property
     def semi_axes(self) -> tuple[Floats, Floats]:
-        """Semi-axes (3,) in metre of bone and skin at the round end."""
+        """Semi-axes (3,) in m of bone and skin at the round end."""
         bone = [self.bone_breadth, self.breadth - 2 * self.tip, self.bone_thickness]
         return np.array(bone) / 2, np.array([self.breadth, self.breadth, self.thickness]) / 2
 
 
 def shell_count(shape: Fingertip, h: float) -> int:
-    """Return the number of shells of a mesh with cells of size h in metre at the skin."""
+    """Return the number of shells of a mesh with cells of size h in m at the skin."""
     return max(FEWEST_SHELLS, round_up(quarter_circumference(shape) / h))
 
 
 def quarter_circumference(shape: Fingertip) -> float:
-    """Return a quarter of the circumference of a fingertip in metre."""
+    """Return a quarter of the circumference of a fingertip in m."""
     return float(np.pi / 4 * (shape.breadth + shape.thickness) / 2)
 
 
@@ -92,7 +92,7 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
     Parameters
     ----------
     shape : Fingertip
-    h : float, metre, target edge length at the skin
+    h : float, m, target edge length at the skin
 
     Returns
     -------
@@ -182,9 +182,7 @@ def _shell_of(lattice: Floats) -> Floats:
 
 
 def _map_lattice(shape: Fingertip, lattice: Floats, ends: tuple[int, int], layers: int) -> Floats:
-    """Points (n, 3) in metre of lattice points; `ends` are the outermost shells of bone and
-    skin.
-    """
+    """Points (n, 3) in m of lattice points; `ends` are the outermost shells of bone and skin."""
     shell = _shell_of(lattice)[:, None]
     shares = (lattice * [1, 0, 1] + np.maximum(lattice, 0) * [0, 1, 0]) / np.maximum(shell, 1e-300)
     outward = np.sin(np.pi / 2 * shares)  # more even on a sphere than the shares themselves

@@ -35,8 +35,8 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     Parameters
     ----------
     palm : Palm
-    x, y, z : (n,) float, metre, increasing grid lines of the box around the palm without its
-        relief: from -breadth/2 to breadth/2, -length/2 to length/2 and -thickness to 0
+    x, y, z : (n,) float, m, increasing grid lines of the box around the palm without its relief:
+        from -breadth/2 to breadth/2, -length/2 to length/2 and -thickness to 0
 
     Returns
     -------

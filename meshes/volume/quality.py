@@ -41,7 +41,7 @@ def angles_between_faces(points: Floats, tets: Ints) -> Floats:
 
 
 def edge_lengths(mesh: TetMesh) -> Floats:
-    """Return the lengths (m, 6) in metre of the straight edges of each tetrahedron."""
+    """Return the lengths (m, 6) in m of the straight edges of each tetrahedron."""
     ends = mesh.points[mesh.tets[:, EDGES]]
     return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
 
@@ -130,7 +130,7 @@ def _check_overlaps(mesh: TetMesh) -> None:
 
 
 def _bodies(mesh: TetMesh) -> tuple[Ints, np.ndarray]:
-    """The body (m,) of each tetrahedron, and the volume of each body in cubic metre."""
+    """The body (m,) of each tetrahedron, and the volume of each body in m3."""
     beyond = neighbours(mesh.tets)
     tet, face = np.nonzero(beyond >= 0)
     body = connected_components(len(mesh.tets), np.column_stack([tet, beyond[tet, face]]))

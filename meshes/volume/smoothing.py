@@ -28,7 +28,7 @@ def smooth(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
     shrinks.
 
     Nodes on the boundary and between regions stay. `sizing` maps points (n, 3) to target edge
-    lengths (n,) in metre; None for equal sizes.
+    lengths (n,) in m; None for equal sizes.
     """
     points, tets = np.array(mesh.points), mesh.tets
     outer = np.zeros(len(points), bool)

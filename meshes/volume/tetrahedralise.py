@@ -53,11 +53,11 @@ def tetrahedralise(
     Parameters
     ----------
     surface : Surface
-    h : float, metre, target edge length
+    h : float, m, target edge length
     inner : name of a region and the closed surface around it, inside the other one or cut off with
         it at one plane
-    sizing : function of points (n, 3) to target edge lengths (n,), metre; None for h everywhere
-    timeout : float, second, limit for the mesher
+    sizing : function of points (n, 3) to target edge lengths (n,), m; None for h everywhere
+    timeout : float, s, limit for the mesher
 
     Returns
     -------
@@ -112,9 +112,7 @@ def graded(h: float, grading: Grading) -> Sizing:
 
 
 def _envelope(surface: Surface, h: float) -> float:
-    """Largest distance in metre of a mesh from a surface. Smaller ones are slower on curved
-    surfaces.
-    """
+    """Largest distance in m of a mesh from a surface. Smaller ones are slower on curved surfaces."""
     thickness, diagonal = thinnest(surface), surface.diagonal
     most, least = MOST_OF_THICKNESS * thickness, SMALLEST_EPSILON * diagonal
     if most < least:
@@ -127,7 +125,7 @@ def _envelope(surface: Surface, h: float) -> float:
 
 
 def check_size(surface: Surface, name: str, length: float) -> None:
-    """Refuse a length in metre that exceeds the body, or is less than a thousandth of it."""
+    """Refuse a length in m that exceeds the body, or is less than a thousandth of it."""
     longest = float(np.ptp(surface.points, axis=0).max())
     if not 1e-3 * longest <= length <= longest:
         raise MeshError(f"{name} = {length} m must be from {1e-3 * longest:.2g} to {longest:.2g} m")

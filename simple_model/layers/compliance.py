@@ -43,9 +43,7 @@ def layered(stack: Stack) -> Compliance:
 
 
 def slab(material: Material, depth: float) -> Compliance:
-    """Return the compliance of a laterally infinite layer of `depth` metre bonded to a
-    rigid base.
-    """
+    """Return the compliance of a laterally infinite layer of `depth` m bonded to a rigid base."""
     return layered(Stack(materials=(material,), thicknesses=(depth,)))
 
 
@@ -80,8 +78,8 @@ def thin_sheet(
 
         G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2],  m = rho d,  D* = mu* d^3 / 6 (1 - nu)
 
-    for a thickness d in metre, a tension T in N/m and an air density in kg/m3. Its static
-    deflection is unbounded, so G = 0 at w = 0.
+    for a thickness d in m, a tension T in N/m and an air density in kg/m3. Its static deflection is
+    unbounded, so G = 0 at w = 0.
     """
     mass_per_area = material.density * thickness
 

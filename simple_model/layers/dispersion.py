@@ -69,7 +69,7 @@ class Mode:
 
     @property
     def decay_length(self) -> Floats:
-        """1/e length (f,) of the amplitude of a plane wave, metre; inf without loss."""
+        """1/e length (f,) of the amplitude of a plane wave, m; inf without loss."""
         with np.errstate(divide="ignore"):
             return np.asarray(1 / np.abs(self.wavenumbers.imag))
 
@@ -112,8 +112,8 @@ class Mode:
         return np.asarray(CubicHermiteSpline(x, k**2, slope, extrapolate=False)(f))
 
     def amplitude(self, width: float, distance: float) -> Complex:
-        """Motion (f,) of the surface in m/Pa by this mode, at a distance in metre from the middle
-        of a Gaussian spot of standard deviation `width`.
+        """Motion (f,) of the surface in m/Pa by this mode, at a distance in m from the middle of a
+        Gaussian spot of standard deviation `width`.
         """
         # The energy of a backward wave travels outwards, so its k takes the same Hankel function.
         k = self.wavenumbers
@@ -124,7 +124,7 @@ class Mode:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DispersionCurves:
-    """Modes of a body at frequencies (f,) in Hz; their shapes are at `depths` (d,) in metre."""
+    """Modes of a body at frequencies (f,) in Hz; their shapes are at `depths` (d,) in m."""
 
     frequencies: Floats
     depths: Floats
@@ -275,7 +275,7 @@ def curves(
     names: tuple[str, ...] = (),
     bound: Floats | None = None,
 ) -> DispersionCurves:
-    """Curves of tracked modes at frequencies (f,) in Hz, with shapes at depths (d,) in metre.
+    """Curves of tracked modes at frequencies (f,) in Hz, with shapes at depths (d,) in m.
 
     Modes without names are numbered by cut-on. `bound` (f,) in 1/m is the wavenumber of the shear
     wave of a half-space below: waves of smaller wavenumbers leak into it.

@@ -72,9 +72,9 @@ def steady_lines(
 ) -> tuple[Floats, Complex]:
     """Compute steady-state lines of the normal displacement, by wavenumber integrals.
 
-    Frequencies (f,) in Hz >= 0 and amplitudes a (f, p) in metre of Re a exp(2 pi i f t) at probes
-    (p, 2) in metre, for a Gaussian focus. Lines below `threshold` of the strongest line of the load
-    are left out.
+    Frequencies (f,) in Hz >= 0 and amplitudes a (f, p) in m of Re a exp(2 pi i f t) at probes
+    (p, 2) in m, for a Gaussian focus. Lines below `threshold` of the strongest line of the load are
+    left out.
     """
     f, amplitudes = field_lines(normal_field(compliance), pressure, probes, threshold=threshold)
     return f, amplitudes[..., 0]
@@ -92,8 +92,8 @@ def field_lines(
 
 
 def weighted_splines(field: Field, splines: Splines, away: Floats) -> Floats:
-    """Splines times weights of a field, (m, c, j, ..., q), at offsets (..., q, 2) in metre of
-    probes from positions of a focus; components are sums over integrals (c, j).
+    """Splines times weights of a field, (m, c, j, ..., q), at offsets (..., q, 2) in m of probes
+    from positions of a focus; components are sums over integrals (c, j).
     """
     of_distance = np.moveaxis(splines(np.linalg.norm(away, axis=-1)), -1, 0)
     return np.asarray(field.weights(away)[:, :, None] * of_distance)
@@ -113,7 +113,7 @@ def steady_history(
 class _Path:
     """Lines of a load at distinct `frequencies` (f,) in Hz: indices of frequency `lines` (l,) and
     harmonic `orders` (l,), `coefficients` (l,) in Pa; standard deviation `width` of the focal spot
-    and `distances` (j,) of the integrals, metre.
+    and `distances` (j,) of the integrals, m.
     """
 
     width: float
@@ -182,7 +182,7 @@ def steady_state(
 ) -> Response:
     """Compute the steady state of the normal displacement: the lines below half the sampling rate.
 
-    Takes the arguments of `flat_body`; returns a Response, displacement (t, p) in metre.
+    Takes the arguments of `flat_body`; returns a Response, displacement (t, p) in m.
     """
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
@@ -207,12 +207,12 @@ def flat_body(
     ----------
     compliance : Compliance
     pressure : MovingPressure, with a Gaussian focus
-    probes : (p, 2) float, metre
+    probes : (p, 2) float, m
     times : (t,) float, s, equally spaced
 
     Returns
     -------
-    Response, displacement (t, p) in metre
+    Response, displacement (t, p) in m
 
     Raises
     ------
@@ -286,7 +286,7 @@ def _sampled_load(
     pressure: MovingPressure, jumps: Floats, padded: int, dt: float, parts: int,
     lasting: Callable[[Floats], Floats],
 ) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
-    """Positions (q, 2) in metre of the foci, and the function from responses to unit pressure there
+    """Positions (q, 2) in m of the foci, and the function from responses to unit pressure there
     (q, j) to responses to the load (t, j), in samples of dt / parts from 0.
     """
     fine = dt / parts
@@ -325,7 +325,7 @@ def _make_response(
 
 
 def _width(pressure: MovingPressure) -> float:
-    """Standard deviation in metre of a Gaussian focal spot; a ValueError for any other load."""
+    """Standard deviation in m of a Gaussian focal spot; a ValueError for any other load."""
     check_lines(pressure)
     width = gaussian_width(pressure.height, pressure.profile)
     if width is None:
@@ -336,7 +336,7 @@ def _width(pressure: MovingPressure) -> float:
 
 
 def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
-    """Distances (j,) in metre of the integrals, and the function from distances (...) to the shares
+    """Distances (j,) in m of the integrals, and the function from distances (...) to the shares
     (..., j) that interpolate between them: cubic splines, flat at 0; few distances are used
     directly.
     """

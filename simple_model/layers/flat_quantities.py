@@ -26,7 +26,7 @@ from simple_model.typing import Complex, Floats
 
 
 def motion_field(stack: Stack, depth: float = 0.0) -> Field:
-    """Displacement along x, y and z, downwards, at a depth in metre."""
+    """Displacement along x, y and z, downwards, at a depth in m."""
     moved = transfer(stack, [depth])
 
     def answer(k: Complex, w: Complex) -> Complex:
@@ -43,7 +43,7 @@ def motion_field(stack: Stack, depth: float = 0.0) -> Field:
 
 
 def strain_field(stack: Stack, depth: float = 0.0) -> Field:
-    """Strain xx, yy, zz, xy, xz, yz at a depth in metre, z upwards."""
+    """Strain xx, yy, zz, xy, xz, yz at a depth in m, z upwards."""
     moved, solid = transfer(stack, [depth]), material_at(stack, depth)
     ratio = solid.first_lame / solid.shear_modulus
 
@@ -71,13 +71,13 @@ def strain_field(stack: Stack, depth: float = 0.0) -> Field:
 
 
 def material_at(stack: Stack, depth: float) -> Material:
-    """Material at a depth in metre; at an interface, the one below."""
+    """Material at a depth in m; at an interface, the one below."""
     bottoms = np.cumsum(stack.thicknesses)[:-1]
     return stack.materials[int(np.searchsorted(bottoms, depth, side="right"))]
 
 
 def quantity_field(quantity: Quantity, stack: Stack, depth: float = 0.0) -> Field:
-    """Components of a quantity, before any `invariant`, at a depth in metre of a stack."""
+    """Components of a quantity, before any `invariant`, at a depth in m of a stack."""
     solid = material_at(stack, depth)
     if quantity.field in (NORMAL, VECTOR):
         field = motion_field(stack, depth)

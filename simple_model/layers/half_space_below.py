@@ -59,8 +59,8 @@ def rayleigh_mode(material: Material, omega: Floats) -> tuple[Roots, Floats]:
 def modes_above_half_space(
     stack: Stack, omega: Floats, moduli: Complex, slopes: Complex, most: int
 ) -> tuple[Roots, Floats]:
-    """Roots of layers on a half-space, the last layer of the stack, and depths (d,) in metre of
-    their shapes.
+    """Roots of layers on a half-space, the last layer of the stack, and depths (d,) in m of their
+    shapes.
 
     `moduli` and `slopes` (f, l) are shear moduli and their derivatives by omega. Of each frequency
     it returns the `most` roots with most motion in the layers, NaN if there are fewer.

@@ -70,7 +70,7 @@ def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
 
 
 def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
-    """Motion and stress at depths (d,) in metre for a unit surface pressure.
+    """Motion and stress at depths (d,) in m for a unit surface pressure.
 
     Returns a function of k (k,) in 1/m and w (f, 1) in rad/s to (4, d, f, k): U and W in m/Pa, N
     and T in Pa/Pa. Raises a ValueError if a depth is outside the stack.
@@ -234,7 +234,7 @@ def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
 
 
 def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex) -> Layer:
-    """Stiffness (f, k) of a layer of a thickness in metre, inf for a half-space."""
+    """Stiffness (f, k) of a layer of a thickness in m, inf for a half-space."""
     mu, kappa = _shear(material, w), (0.5 - material.poisson) / (1 - material.poisson)
     k2, ks2, over_k = k * k, material.density * w**2 / mu, 1 / k
     p, s = np.sqrt(k2 - kappa * ks2), np.sqrt(k2 - ks2)

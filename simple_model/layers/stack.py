@@ -16,7 +16,7 @@ class Stack:
     Parameters
     ----------
     materials : of each layer
-    thicknesses : metre, of each layer, above 0; the last may be inf, a half-space
+    thicknesses : m, of each layer, above 0; the last may be inf, a half-space
     base : below the last layer if it is finite: "clamped", "free" or "elastic" (Winkler foundation)
     base_stiffness : N/m3, traction per displacement of an elastic base, in every direction
 
@@ -52,7 +52,7 @@ class Stack:
 
     @property
     def thickness(self) -> float:
-        """Thickness of all layers, metre; inf with a half-space below."""
+        """Thickness of all layers, m; inf with a half-space below."""
         return sum(self.thicknesses)
 
     @property

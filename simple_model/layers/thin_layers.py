@@ -37,7 +37,7 @@ MATCHED = np.exp(-0.6j) * np.array([0.75, 1.5, 3.0, 6.0, 12.0])  # element lengt
 class Pencil:
     """Matrices of the pencil at frequencies (f,): (f, n, n), or (f, n) if diagonal; U and W share
     M. `traction` is the part of Buw by which U does work on the normal stress of a section x =
-    const. `depths` (d,) in metre are those of the nodes outside a matched layer.
+    const. `depths` (d,) in m are those of the nodes outside a matched layer.
     """
 
     Auu: Complex
@@ -78,8 +78,8 @@ def gauss() -> tuple[Floats, Floats, Floats]:
 
 
 def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
-    """Layer of each element, and the lengths (f, e) of elements in metre; a ValueError if there are
-    too many.
+    """Layer of each element, and the lengths (f, e) of elements in m; a ValueError if there are too
+    many.
     """
     layers, lengths = [], []
     finite = sum(thickness for thickness in stack.thicknesses if np.isfinite(thickness))

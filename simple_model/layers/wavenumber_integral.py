@@ -51,8 +51,8 @@ class Field:
     answer : (k (k,) in 1/m, w (f, 1) in rad/s) -> (c, f, k), per pressure
     orders : (c,) order n of each integral
     clearance : as of `Compliance`
-    weights : horizontal offsets (..., 2) in metre from the focus -> (m, c, ...); components are
-        sums over c of weights times integrals
+    weights : horizontal offsets (..., 2) in m from the focus -> (m, c, ...); components are sums
+        over c of weights times integrals
     """
 
     answer: Callable[[Complex, Complex], Complex]
@@ -72,7 +72,7 @@ class _Grid:
 
 
 def normal_field(compliance: Compliance) -> Field:
-    """Displacement of the surface into the body, metre."""
+    """Displacement of the surface into the body, m."""
     return Field(
         answer=lambda k, w: compliance(k, w)[None],
         orders=(0,),
@@ -101,9 +101,9 @@ def point_integrals(
     Parameters
     ----------
     field : Field
-    distances : (r,) float, metre
+    distances : (r,) float, m
     frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
-    width : metre, standard deviation of the spot
+    width : m, standard deviation of the spot
     negligible : for ascending frequencies: integration ends after the batch in which each integral
         is below this fraction of its largest value
 

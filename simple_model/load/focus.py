@@ -34,7 +34,7 @@ HALF_DEPTH = 37e-3  # m at 200 mm, above and below the focus, to half its intens
 NOMINAL_HEIGHT = 0.200  # m
 FOCI = ("gaussian", "main_lobe", "array")
 CONTACT_WIDTHS = (0.2e-3, 20e-3)  # m, standard deviations of a `ContactSpot`
-FocalSpot = Callable[[Floats], Floats]  # offsets (..., 2) in metre from the focus -> relative (...)
+FocalSpot = Callable[[Floats], Floats]  # offsets (..., 2) in m from the focus -> relative (...)
 
 # Force of `array_field` on a disc of radius 10 mm about the focus, relative to 200 mm. A balance
 # measures this force, and only this force has its maximum at 200 mm.
@@ -47,7 +47,7 @@ _FORCES = np.array(
 
 @dataclass(frozen=True, kw_only=True)
 class ContactSpot:
-    """Gaussian traction of a small contact of standard deviation `width` in metre.
+    """Gaussian traction of a small contact of standard deviation `width` in m.
 
     It is the same at all heights. A width outside `CONTACT_WIDTHS` raises a ValueError.
     """
@@ -61,17 +61,16 @@ class ContactSpot:
 
     @property
     def spacing(self) -> float:
-        """Length in metre that samples must resolve."""
+        """Length in m that samples must resolve."""
         return self.width
 
     def __call__(self, offsets: Floats) -> Floats:
-        """Relative traction (...) at offsets (..., 2) in metre from the middle."""
+        """Relative traction (...) at offsets (..., 2) in m from the middle."""
         return np.asarray(np.exp(-(offsets**2).sum(axis=-1) / (2 * self.width**2)))
 
 
 def array_field(points: ArrayLike, focus: ArrayLike) -> Complex:
-    """Return the complex sound pressure amplitude (n,) in Pa at points (n, 3) for a focus (3,),
-    metre.
+    """Return the complex sound pressure amplitude (n,) in Pa at points (n, 3) for a focus (3,), m.
 
     The array is centred at the origin in the plane z = 0 and radiates upwards.
     """
@@ -89,7 +88,7 @@ def array_field(points: ArrayLike, focus: ArrayLike) -> Complex:
 
 @lru_cache(maxsize=64)  # every pressure of a load needs it
 def relative_intensity(height: float) -> float:
-    """Return the intensity at a height in metre relative to 200 mm, where it is greatest.
+    """Return the intensity at a height in m relative to 200 mm, where it is greatest.
 
     Raises a ValueError if the height is outside 20 to 600 mm.
     """
@@ -103,7 +102,7 @@ def relative_intensity(height: float) -> float:
 
 
 def lobe_width(height: float) -> float:
-    """Radius D0 in metre of the main lobe, to the first zero, at a height in metre."""
+    """Radius D0 in m of the main lobe, to the first zero, at a height in m."""
     above = height - NOMINAL_HEIGHT
     return 11.6e-3 + 46.5e-3 * above + 25e-3 * above**2
 
@@ -115,8 +114,8 @@ def focal_spot(
 
     Parameters
     ----------
-    offsets : (..., 2) float, metre from the focus
-    height : metre, of the focus above the array
+    offsets : (..., 2) float, m from the focus
+    height : m, of the focus above the array
     profile : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; "array", the
         field of the array with its side lobes, to 60 mm along each axis; or a function of the
         offsets
@@ -140,7 +139,7 @@ def focal_spot(
 def spot_of_foci(
     points: Floats, centres: Floats, height: float, profile: str | FocalSpot
 ) -> Floats:
-    """Focal spot (..., n) at points (n, 2) in metre for a focus at positions (..., 2)."""
+    """Focal spot (..., n) at points (n, 2) in m for a focus at positions (..., 2)."""
     if profile == "array" or not isinstance(profile, str):
         return focal_spot(points - centres[..., None, :], height, profile)
     # |x - c|^2 = |x|^2 - 2 x.c + |c|^2 as one matrix product, the fastest way.
@@ -150,7 +149,7 @@ def spot_of_foci(
 
 
 def _scale(height: float, profile: str) -> float:
-    """Length d in metre of an axisymmetric focal spot, exp(-(D/d)^2) or (sin(D/d) / (D/d))^2."""
+    """Length d in m of an axisymmetric focal spot, exp(-(D/d)^2) or (sin(D/d) / (D/d))^2."""
     return np.sqrt(2) * spot_width(height) if profile == "gaussian" else lobe_width(height) / np.pi
 
 
@@ -165,17 +164,17 @@ def _round_spot(squared: Floats, profile: str) -> Floats:
 
 
 def spot_width(height: float) -> float:
-    """Standard deviation in metre of the Gaussian focal spot at a height in metre."""
+    """Standard deviation in m of the Gaussian focal spot at a height in m."""
     return GAUSSIAN_WIDTH * lobe_width(height) / lobe_width(NOMINAL_HEIGHT)
 
 
 def spot_detail(height: float, profile: str | FocalSpot) -> float:
-    """Length in metre that samples of a focal spot along its path must resolve."""
+    """Length in m that samples of a focal spot along its path must resolve."""
     return min(spot_width(height), getattr(profile, "spacing", np.inf))
 
 
 def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
-    """Relative intensity (...) on the axis, at an offset (...) in metre above or below the focus.
+    """Relative intensity (...) on the axis, at an offset (...) in m above or below the focus.
 
     A Gaussian whose half width is proportional to the square of that of the focal spot, within 4 %
     of `array_field`.
@@ -185,13 +184,13 @@ def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
 
 
 def spot_reach(height: float, profile: str | FocalSpot) -> float:
-    """Radius in metre beyond which a Gaussian focal spot is below 1e-7; infinite for others."""
+    """Radius in m beyond which a Gaussian focal spot is below 1e-7; infinite for others."""
     width = gaussian_width(height, profile)
     return np.inf if width is None else 5.7 * width
 
 
 def gaussian_width(height: float, profile: str | FocalSpot) -> float | None:
-    """Standard deviation in metre of a focal spot; None if it is not Gaussian."""
+    """Standard deviation in m of a focal spot; None if it is not Gaussian."""
     if isinstance(profile, ContactSpot):
         return profile.width
     return spot_width(height) if profile == "gaussian" else None

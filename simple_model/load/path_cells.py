@@ -42,9 +42,9 @@ class PathCells:
     """One repetition of a load in k equal cells, `frequency` times a second.
 
     Cell by cell, the load is the matrix `cells` (k, q) times the effect of a focus of unit pressure
-    at `positions` (q, 2) in metre. It is one focus of unit pressure that runs once along the path
-    or, if `of_tacton`, the whole load in Pa: with a rhythm or a signal, or if the Tacton is too
-    short for a path that jumps.
+    at `positions` (q, 2) in m. It is one focus of unit pressure that runs once along the path or,
+    if `of_tacton`, the whole load in Pa: with a rhythm or a signal, or if the Tacton is too short
+    for a path that jumps.
     """
 
     positions: Floats
@@ -101,8 +101,8 @@ def sampled_load(
 ) -> tuple[Floats, sparse.csr_array]:
     """Sample the load of all foci at times (m,) in s, with factors (m,) in Pa.
 
-    Returns positions (q, 2) in metre and the matrix (m, q) in Pa that combines foci of unit
-    pressure there.
+    Returns positions (q, 2) in m and the matrix (m, q) in Pa that combines foci of unit pressure
+    there.
     """
     tacton = pressure.tacton
     path, detail = tacton.trajectory, spot_detail(pressure.height, pressure.profile)
@@ -122,7 +122,7 @@ def sampled_load(
 
 
 def path_samples(pressure: MovingPressure) -> Floats:
-    """Positions (q, 2) in metre that make up a load; one if the focus is static."""
+    """Positions (q, 2) in m that make up a load; one if the focus is static."""
     return path_cells(pressure).positions
 
 
@@ -205,7 +205,7 @@ def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
 
 
 def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats, sparse.csr_array]:
-    """Positions (q, 2) in metre on a path, and the matrix (m, q) that interpolates to phases (m,).
+    """Positions (q, 2) in m on a path, and the matrix (m, q) that interpolates to phases (m,).
 
     Cubics interpolate along each part of the path that has more phases than nodes.
     """

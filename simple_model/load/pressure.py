@@ -43,13 +43,13 @@ class MovingPressure:
     ----------
     tacton : Tacton
     profile : "gaussian", "main_lobe" or "array", the shape of the focal spot; or a function of
-        offsets (..., 2) in metre, with details no finer than those of the Gaussian
+        offsets (..., 2) in m, with details no finer than those of the Gaussian
     drive : "linear", "pressure_squared", "force_corrected", or a DriveLaw
     depth_of_modulation : float, 0 to 1; the linear law does not use it
     peak_pressure : float, Pa, at the focus at full drive and 200 mm. The default of 50 Pa,
         uncertain by a factor of 2, is the radiation pressure of a 160 dB focus on a wall that
         reflects fully.
-    height : float, metre, of the focus above the array
+    height : float, m, of the focus above the array
     heading : "x" or "y" multiplies the pressure by that component of the unit tangent of the path,
         as for a traction along the path; "" does not
 
@@ -110,7 +110,7 @@ class MovingPressure:
         return self.profile if isinstance(self.profile, str) else "own"
 
     def __call__(self, points: ArrayLike, t: ArrayLike) -> Floats:
-        """Pressure (..., n) in Pa at points (n, 2 or 3) in metre and times (...) in s."""
+        """Pressure (..., n) in Pa at points (n, 2 or 3) in m and times (...) in s."""
         t, points = np.asarray(t, np.float64), np.asarray(points, np.float64)
         path, gain = self.tacton.trajectory, self.gain(t).ravel()
         phases = [np.mod(path.phase(t).ravel() + ahead, 1.0) for ahead in self.tacton.foci]
@@ -155,9 +155,7 @@ class MovingPressure:
         return full / len(self.tacton.foci) * relative
 
     def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:
-        """Relative focal spot (..., n) at points (n, 2 or 3), for a focus at centres (..., 2),
-        metre.
-        """
+        """Relative focal spot (..., n) at points (n, 2 or 3), for a focus at centres (..., 2), m."""
         points, centre = np.asarray(points, np.float64), np.asarray(centre, np.float64)
         spot = spot_of_foci(points[:, :2], centre, self.height, self.profile)
         contact = isinstance(self.profile, ContactSpot)

@@ -115,7 +115,7 @@ def pressure_lines(
     pressure: MovingPressure, points: Floats, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
     """Frequencies (f,) in Hz of the distinct `load_lines`, and their complex amplitudes (f, n) in
-    Pa at points (n, 2 or 3) in metre of the surface.
+    Pa at points (n, 2 or 3) in m of the surface.
     """
     lines, knots = load_lines(pressure, threshold), path_samples(pressure)
     points = np.asarray(points, np.float64)

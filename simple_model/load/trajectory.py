@@ -46,15 +46,15 @@ class Trajectory:
     Parameters
     ----------
     shape : one of `SHAPES` or `BY_POINTS`
-    size : float, metre, 0 to 0.06: length of the line, diameter of the circle, side of the triangle
-        or square; 0 for "polyline" and "recorded"
+    size : float, m, 0 to 0.06: length of the line, diameter of the circle, side of the triangle or
+        square; 0 for "polyline" and "recorded"
     speed : float, m/s, along the path; 0 for "recorded"
     sweep : how a line or an open polyline repeats: "there_and_back" (f_d = speed / 2 length),
         "one_way" (f_d = speed / length, then a jump back) or "sinusoidal" (there and back as a
         cosine of time, with `speed` as the mean speed)
-    centre : (x, y), metre, added to all positions
-    points : (k, 2), metre, corners of a polyline or positions of a recording. A polyline is closed
-        if its last corner equals its first.
+    centre : (x, y), m, added to all positions
+    points : (k, 2), m, corners of a polyline or positions of a recording. A polyline is closed if
+        its last corner equals its first.
     times : (k,), s, start at 0 and never fall: when a recording is at its points. Its period is
         times[-1]. Equal times make a jump.
     levels : (k,), 0 to 1, factors of the amplitude at those times; 1 throughout if empty
@@ -91,7 +91,7 @@ class Trajectory:
 
     @property
     def length(self) -> float:
-        """Path length of one period, metre."""
+        """Path length of one period, m."""
         if self.shape in ("point", "circle"):
             return pi * self.size * (self.shape == "circle")
         steps = float(self._arc[-1])
@@ -117,7 +117,7 @@ class Trajectory:
 
     @property
     def outline(self) -> Floats:
-        """Positions (k, 2) in metre whose convex hull contains the path."""
+        """Positions (k, 2) in m whose convex hull contains the path."""
         if self.shape == "circle":
             return self.at_phase(np.linspace(0, 1, 721))
         return self._corners + self.centre
@@ -127,11 +127,11 @@ class Trajectory:
         return np.mod(self.drawing_frequency * np.asarray(t, np.float64), 1.0)
 
     def position(self, t: ArrayLike) -> Floats:
-        """Position (..., 2) in metre at times (...) in s."""
+        """Position (..., 2) in m at times (...) in s."""
         return self.at_phase(self.phase(t))
 
     def at_phase(self, phase: ArrayLike) -> Floats:
-        """Position (..., 2) in metre at fractions (...) of the period, 0 to 1."""
+        """Position (..., 2) in m at fractions (...) of the period, 0 to 1."""
         around = self._about_origin(np.asarray(phase, np.float64))
         return around + self.centre if any(self.centre) else around
 
@@ -155,7 +155,7 @@ class Trajectory:
     @cached_property
     def parts(self) -> tuple[Floats, Floats]:
         """Bounds (s + 1,) of the smooth parts, as fractions of the period from 0 to 1, and their
-        lengths (s,) in metre.
+        lengths (s,) in m.
         """
         if self.shape == "recorded":
             clock = self._clock
@@ -191,7 +191,7 @@ class Trajectory:
         return before, after
 
     def within_part(self, part: int, along: Floats) -> Floats:
-        """Positions (k, 2) in metre at fractions (k,) of the time of a part, ends included."""
+        """Positions (k, 2) in m at fractions (k,) of the time of a part, ends included."""
         start, end = self.parts[0][part : part + 2]
         phases = start + (end - start) * along
         return self.at_phase(np.clip(phases, start + self._nearby, end - self._nearby))
@@ -233,7 +233,7 @@ class Trajectory:
 
     @cached_property
     def _arc(self) -> Floats:
-        """Arc length (k,) in metre up to each point."""
+        """Arc length (k,) in m up to each point."""
         steps = np.linalg.norm(np.diff(self._corners, axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -308,7 +308,7 @@ def even_phases(n: int) -> tuple[float, ...]:
 
 
 def split_recording(path: Trajectory, n: int) -> tuple[Floats, ...]:
-    """Split a recording into n parts of equal time. Return the corners (k, 2) in metre of each."""
+    """Split a recording into n parts of equal time. Return the corners (k, 2) in m of each."""
     clock = np.array(path.times) * n / path.times[-1]
     # At a jump from part to part there are two corners: the first ends one, the second begins one.
     first = np.searchsorted(clock, np.arange(n) + SAME_PHASE, side="right") - 1

@@ -29,8 +29,8 @@ GATHERS = "xi,yj,pxy->ijp"
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Grid:
     """Gauss points of a plate and the polynomials on it, along x and along y: `breaks` (e + 1,) in
-    metre, whether functions are `split` into even and odd, `degrees` (e,) on each piece, and
-    `points` and `weights` in metre.
+    m, whether functions are `split` into even and odd, `degrees` (e,) on each piece, and `points`
+    and `weights` in m.
     """
 
     breaks: tuple[Floats, Floats]

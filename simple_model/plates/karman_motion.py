@@ -65,7 +65,7 @@ def linear_motion(
     steps.
 
     The material has the `shear_modulus` of the modes and no modulus law of its own; times (t,) in s
-    are 0 or above; `middle` (2,) in metre is that of the plate in the scene. Returns the modes of
+    are 0 or above; `middle` (2,) in m is that of the plate in the scene. Returns the modes of
     indices `chosen` (r,), by default all. Lines of the load from `highest` Hz on are left out.
     """
 

@@ -52,14 +52,14 @@ class Plate:
 
     Parameters
     ----------
-    size_x, size_y : metre
+    size_x, size_y : m
     d11, d22, d12, d66 : N m, bending stiffnesses; of an isotropic plate D, D, nu D, (1 - nu) D / 2
     mass_per_area : kg/m2
     tension_x, tension_y : N/m, uniform
     left, right, front, back : "clamped", "simply" or "free", the edges at least and greatest x and
         y
-    clips : ((x, y), ...) metre, where the plate is fixed
-    clip_radius : metre, half a side of the fixed square; 0 fixes the deflection of a point only
+    clips : ((x, y), ...) m, where the plate is fixed
+    clip_radius : m, half a side of the fixed square; 0 fixes the deflection of a point only
     air_density : kg/m3, 0 in vacuum
 
     Raises a ValueError if a value is out of range, or a clip is off the plate.
@@ -146,7 +146,7 @@ class PlateModes:
         return np.sort(np.sqrt(np.maximum(self.squared, 0.0))) / (2 * np.pi)
 
     def at(self, points: ArrayLike) -> Floats:
-        """Shapes (p, m) in kg^-1/2 at points (p, 2) in metre."""
+        """Shapes (p, m) in kg^-1/2 at points (p, 2) in m."""
         x, y = np.asarray(points, np.float64).T
         return np.hstack([
             np.einsum("pi,ijm,pj->pm", f.x(x), f.shapes, f.y(y), optimize=True)
@@ -154,7 +154,7 @@ class PlateModes:
         ])  # fmt: skip
 
     def on_grid(self, x: Floats, y: Floats) -> Floats:
-        """Shapes (x y, m) in kg^-1/2 at each x (x,) with each y (y,) in metre, y faster."""
+        """Shapes (x y, m) in kg^-1/2 at each x (x,) with each y (y,) in m, y faster."""
         each = [
             np.einsum("pi,ijm,qj->pqm", f.x(x), f.shapes, f.y(y), optimize=True)
             for f in self.families
@@ -187,7 +187,7 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
 def modal_motion(
     modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
 ) -> Complex:
-    """Steady modal coordinates q (f, m) in metre kg^1/2 under modal forces (f, m) in N kg^-1/2 at
+    """Steady modal coordinates q (f, m) in m kg^1/2 under modal forces (f, m) in N kg^-1/2 at
     frequencies (f,) in Hz.
 
     They solve (diag(w_m^2) + (h - 1) B - w^2) q = force, with the stiffness B of bending between
@@ -288,7 +288,7 @@ def _line_bases(plate: Plate, axis: int, finest: float, mirrored: bool) -> tuple
 
 
 def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
-    """Sides of the clips along an axis within the plate, in metre, and lines next to them: at the
+    """Sides of the clips along an axis within the plate, in m, and lines next to them: at the
     corners of a clip the curvature is unbounded.
     """
     reach = plate.clip_radius

@@ -23,7 +23,7 @@ def modal_path_forces(
     modes: PlateModes, pressure: MovingPressure, middle: Sequence[float] = MIDDLE
 ) -> Complex:
     """Modal forces (n, m) in N kg^-1/2 of unit pressure on the path, by harmonic of the path;
-    `middle` (2,) in metre is that of the plate.
+    `middle` (2,) in m is that of the plate.
     """
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     detail = spot_detail(pressure.height, pressure.profile)
@@ -48,8 +48,8 @@ def plate_lines(
     middle: Sequence[float] = MIDDLE,
     path: Complex | None = None,
 ) -> tuple[Floats, Complex]:
-    """Lines of the steady displacement at probes (p, 2) in metre, positive the way the pressure
-    pushes: frequencies (f,) in Hz and complex amplitudes (f, p) in metre.
+    """Lines of the steady displacement at probes (p, 2) in m, positive the way the pressure pushes:
+    frequencies (f,) in Hz and complex amplitudes (f, p) in m.
 
     The modulus of bending is as of `modal_motion`, `middle` as of `modal_path_forces`; `path` (n,
     m) are the modal path forces if known.
@@ -61,7 +61,7 @@ def plate_lines(
 
 
 def _gauss(low: float, high: float, detail: float) -> tuple[Floats, Floats]:
-    """Gauss points and weights (k,) in metre between two places, for a detail in metre."""
+    """Gauss points and weights (k,) in m between two places, for a detail in m."""
     high = max(low, high)
     count = int(np.ceil(np.pi / 2 * (high - low) / (SPACING * detail))) + SPARE
     return gauss_points(np.array([low, high]), [count])

@@ -25,7 +25,7 @@ NULL_RATIO = 1e-10  # of the largest singular value, below which a condition dep
 class LineBasis:
     """Functions u_i on the pieces of a line, all of one symmetry or of none.
 
-    `breaks` (e + 1,) in metre from the middle: the ends of the pieces. `legendre` (e, n, i):
+    `breaks` (e + 1,) in m from the middle: the ends of the pieces. `legendre` (e, n, i):
     coefficients in the orthonormal Legendre polynomials of each piece. Integrals (i, i): `mass` of
     u_i u_k, `slope` of u_i' u_k', `curvature` of u_i'' u_k'', `mixed` of u_i'' u_k.
     """
@@ -44,15 +44,15 @@ class LineBasis:
 
     @property
     def length(self) -> float:
-        """Length of the line, metre."""
+        """Length of the line, m."""
         return float(np.ptp(self.breaks))
 
     def __call__(self, x: Floats) -> Floats:
-        """Values (p, i) in m^-1/2 at x (p,) in metre from the middle."""
+        """Values (p, i) in m^-1/2 at x (p,) in m from the middle."""
         return self._values(x, self.legendre)
 
     def slopes(self, x: Floats) -> Floats:
-        """First derivatives (p, i) in m^-3/2 at x (p,) in metre from the middle."""
+        """First derivatives (p, i) in m^-3/2 at x (p,) in m from the middle."""
         per_piece = (2 / np.diff(self.breaks))[:, None, None]
         d = _derivative(self.legendre.shape[1] - 1)
         return self._values(x, per_piece * (d @ self.legendre))
@@ -71,14 +71,14 @@ class LineBasis:
         return values
 
     def nonzero_within(self, low: float, high: float) -> Bools:
-        """Whether each function (i,) is nonzero between two breaks, in metre."""
+        """Whether each function (i,) is nonzero between two breaks, in m."""
         middles = (self.breaks[1:] + self.breaks[:-1]) / 2
         within = (low < middles) & (middles < high)
         return np.asarray((self.legendre[within] != 0).any(axis=(0, 1)))
 
 
 def gauss_points(breaks: Floats, counts: Sequence[int]) -> tuple[Floats, Floats]:
-    """Gauss points and weights in metre, `counts` on each piece of a line between breaks."""
+    """Gauss points and weights in m, `counts` on each piece of a line between breaks."""
     points, weights = [], []
     for low, high, count in zip(breaks[:-1], breaks[1:], counts, strict=True):
         nodes, each = legendre.leggauss(count)
@@ -90,8 +90,8 @@ def gauss_points(breaks: Floats, counts: Sequence[int]) -> tuple[Floats, Floats]
 def line_basis(
     length: float, ends: Sequence[str], degree: int, split: bool
 ) -> tuple[LineBasis, ...]:
-    """Orthonormal functions up to a degree, on one piece of a length in metre, that meet the
-    supports of both ends: one basis or, with `split`, one of even and one of odd functions.
+    """Orthonormal functions up to a degree, on one piece of a length in m, that meet the supports
+    of both ends: one basis or, with `split`, one of even and one of odd functions.
     """
     n = np.arange(degree + 1)
     breaks = np.array([-length / 2, length / 2])
@@ -104,8 +104,8 @@ def line_basis(
 def piecewise_basis(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
 ) -> tuple[LineBasis, ...]:
-    """Functions that are continuous with their slope at the breaks (e + 1,) of a line, in metre
-    from the middle, up to `degrees` (e,) of 3 or more on each piece; with `split`, even and odd
+    """Functions that are continuous with their slope at the breaks (e + 1,) of a line, in m from
+    the middle, up to `degrees` (e,) of 3 or more on each piece; with `split`, even and odd
     functions in two bases.
     """
     return _pieces(breaks, ends, degrees, split, "clamped")

@@ -80,7 +80,7 @@ class KarmanPlate:
         return parts
 
     def shapes(self, points: ArrayLike) -> Floats:
-        """Shapes (p, r) in kg^-1/2 of the chosen modes at points (p, 2) in metre."""
+        """Shapes (p, r) in kg^-1/2 of the chosen modes at points (p, 2) in m."""
         return np.asarray(self.modes.at(points)[:, self.chosen])
 
     def gradients(self, z: Floats) -> Floats:
@@ -102,7 +102,7 @@ def karman_plate(
     Parameters
     ----------
     modes : PlateModes
-    thickness : metre; the membrane stiffness is 12 / thickness^2 times the bending stiffness
+    thickness : m; the membrane stiffness is 12 / thickness^2 times the bending stiffness
     count : number of modes that stretch the plate, the lowest
     in_plane : effect of supported edges on the in-plane displacement: "held" fixes it, "sliding"
         fixes only its component across the edge, "movable" leaves it free. Clips with a radius

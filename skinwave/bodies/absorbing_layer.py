@@ -17,10 +17,10 @@ LOWEST_CUT_ON = 80.0  # Hz: motion of deeper slabs below it is near field at the
 
 @dataclass(frozen=True, kw_only=True)
 class AbsorbingLayer:
-    """Absorbing layer of a `width` in metre.
+    """Absorbing layer of a `width` in m.
 
     Its mass-proportional damping rises with the square of the distance, up to `drag` in 1/s. Its
-    cells grow by `growth` from one to the next, up to `coarsest` in metre.
+    cells grow by `growth` from one to the next, up to `coarsest` in m.
     """
 
     width: float

@@ -55,8 +55,8 @@ class Body:
         bends), "slab" (thick), "palm" (soft tissue on bone, `depth` below the middle of the palm),
         "finger" (soft tissue around bone), "disc" or "mesh" (from a file)
     material : name of a preset, or a Material
-    width, height, depth : float, metre, along x, y and downwards, at most 2; the depth of a slab
-        may be inf, a half-space, which only flat-body can compute
+    width, height, depth : float, m, along x, y and downwards, at most 2; the depth of a slab may be
+        inf, a half-space, which only flat-body can compute
     base, sides : "clamped", "absorbing" or "free"; a base may also be "elastic", a Winkler
         foundation. The base of a hand is its part that faces downwards, its sides are the ends at
         wrist and fingers, or the cuts of a file. `Sides` gives each side its own condition.
@@ -110,7 +110,7 @@ class Body:
             if length > LARGEST:
                 raise ValueError(
                     f"body {name} = {length:g} m exceeds {LARGEST:g} m; {length:g} mm are "
-                    f"{name} = {length / 1e3:g} in metre, or {KEYS[name]} = {length:g} in a scene"
+                    f"{name} = {length / 1e3:g} in m, or {KEYS[name]} = {length:g} in a scene"
                 )
         if kind.discretise and {self.base, *self.conditions} == {"free"}:
             raise ValueError(
@@ -183,7 +183,7 @@ class Body:
 
     @property
     def strata(self) -> tuple[tuple[float, Material], ...]:
-        """Depth in metre at which each material begins; equal neighbours are merged."""
+        """Depth in m at which each material begins; equal neighbours are merged."""
         strata: list[tuple[float, Material]] = []
         top = 0.0
         for thickness, material in [
@@ -197,12 +197,12 @@ class Body:
 
     @property
     def interfaces(self) -> list[float]:
-        """Depths in metre at which the strata begin, and at which the last one ends."""
+        """Depths in m at which the strata begin, and at which the last one ends."""
         return [*(start for start, _ in self.strata), self.depth]
 
     @property
     def thicknesses(self) -> list[float]:
-        """Thickness in metre of each given layer, then of the whole body."""
+        """Thickness in m of each given layer, then of the whole body."""
         return [*(layer.thickness for layer in self.layers), self.depth]
 
     @property
@@ -270,17 +270,16 @@ class BodyKind:
         supplies missing keys of a scene
     check : raises a ValueError for a body that is not possible
     words : kind and size in a few words
-    discretise : mesh for an element size in metre
-    morph : for the thinnest and the thickest body of a range and an element size in metre, a
-        function like `discretise` whose meshes have the same nodes, moved in proportion to the
-        layers, so that matrices are sums of few terms
-    equivalent : thickness in metre of the mesh that stands for all thinner bodies, with equivalent
+    discretise : mesh for an element size in m
+    morph : for the thinnest and the thickest body of a range and an element size in m, a function
+        like `discretise` whose meshes have the same nodes, moved in proportion to the layers, so
+        that matrices are sums of few terms
+    equivalent : thickness in m of the mesh that stands for all thinner bodies, with equivalent
         modulus and density (`sheet.bending_equivalent`)
-    grid_lines : grid lines (n,) in metre along x, y and z for an element size in metre
-    check_size : raises a ValueError for an element size in metre that gives too many elements
-    default_size : default element size, metre
-    interactive_size : element size in metre for a response within seconds and errors of some per
-        cent
+    grid_lines : grid lines (n,) in m along x, y and z for an element size in m
+    check_size : raises a ValueError for an element size in m that gives too many elements
+    default_size : default element size, m
+    interactive_size : element size in m for a response within seconds and errors of some per cent
     compliance : wavenumber integral of a laterally infinite body
     dispersion : dispersion curves of a laterally infinite body of the same section, at frequencies
         (f,) in Hz with at most so many modes
@@ -291,10 +290,10 @@ class BodyKind:
     is_symmetric : whether its mesh may be halved at x = 0 and y = 0
     is_bounded : whether width and height are those of its surface
     may_be_layered : whether it may have layers
-    actual_size : size in metre of a mesh whose cells come in whole numbers
+    actual_size : size in m of a mesh whose cells come in whole numbers
     conforming : whether elements follow its layers
     may_be_coated : whether layers thinner than elements may become a coat
-    normal_patch : metre, standard deviation of the area about a probe whose mean normal is the
+    normal_patch : m, standard deviation of the area about a probe whose mean normal is the
         direction of its motion; 0 for the normal at the probe
     """
 

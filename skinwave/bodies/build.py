@@ -58,8 +58,8 @@ def build(
 ) -> Build:
     """Mesh a body with its materials and boundary conditions.
 
-    `h` is the element size in metre, by default that of the body. Across the axes of `symmetry`,
-    "x", "y" or "xy", only the part at positive coordinates is meshed, with symmetry conditions.
+    `h` is the element size in m, by default that of the body. Across the axes of `symmetry`, "x",
+    "y" or "xy", only the part at positive coordinates is meshed, with symmetry conditions.
     `discretise` replaces that of the kind. Raises a ValueError if the body has no such mesh.
     """
     size = check_element_size(body, h or default_size(body), COMPARED)

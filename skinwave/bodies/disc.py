@@ -20,9 +20,7 @@ def check(body: Body) -> None:
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Return ten-node tetrahedra of at most h in metre, in equal rings and the layers of
-    the body.
-    """
+    """Return ten-node tetrahedra of at most h in m, in equal rings and the layers of the body."""
     return _in_strata(body, disc(body.width, body.depth, h, body.interfaces[1:-1]))
 
 

@@ -15,7 +15,7 @@ from simple_model.layers.material import Material
 from skinwave.typing import Bools, Floats
 
 THINNEST = 0.5  # of an element that does not follow layers: the thinnest layer that it resolves
-Strata = Sequence[tuple[float, Material]]  # depth in metre at which each begins, and its material
+Strata = Sequence[tuple[float, Material]]  # depth in m at which each begins, and its material
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,7 +39,7 @@ class Discretised:
     stiffener: Callable[[TetMesh], sparse.csr_array] | None = None
 
 
-Discretise = Callable[[Any, float], Discretised]  # of a body and an element size in metre
+Discretise = Callable[[Any, float], Discretised]  # of a body and an element size in m
 
 
 def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:

@@ -22,12 +22,12 @@ def shape(body: Body) -> Fingertip:
 
 
 def actual_size(body: Body, h: float) -> float:
-    """Return the cell size in metre at the skin of a mesh with a whole number of shells."""
+    """Return the cell size in m at the skin of a mesh with a whole number of shells."""
     return quarter_circumference(shape(body)) / shell_count(shape(body), h)
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Return ten-node tetrahedra of h in metre at the skin, with the region `bone`."""
+    """Return ten-node tetrahedra of h in m at the skin, with the region `bone`."""
     mesh = fingertip_mesh(shape(body), h)
     facets = {name: mesh.facets[name] for name in ("top", "sides")}
     return in_tissue_layers(body, h, replace(mesh, facets=facets))

@@ -35,7 +35,7 @@ CELL = 0.85
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Return ten-node tetrahedra of h in metre about the middle of the palm, growing away from it.
+    """Return ten-node tetrahedra of h in m about the middle of the palm, growing away from it.
 
     The support below stands for bone, that at both ends for the tissue that was cut.
     """
@@ -57,7 +57,7 @@ def _coarsest(body: Body, h: float) -> float:
 
 
 def body_lines(body: Body, h: float) -> Lines:
-    """Return grid lines in metre of the box around a palm, with cells that grow from its middle."""
+    """Return grid lines in m of the box around a palm, with cells that grow from its middle."""
     side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
     finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
     along = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest)

@@ -19,7 +19,7 @@ class Layer:
 
     Parameters
     ----------
-    thickness : float, metre
+    thickness : float, m
     material : name of a preset, or a Material
     """
 
@@ -33,8 +33,7 @@ class Layer:
 
 @dataclass(frozen=True, kw_only=True)
 class Relief:
-    """Relief of a palm, in metre, as for `meshes.Palm`; with all heights 0, a slab with rounded
-    edges.
+    """Relief of a palm, in m, as for `meshes.Palm`; with all heights 0, a slab with rounded edges.
 
     Values of None are those of an adult, reduced where the palm is too small for them.
     """
@@ -47,7 +46,7 @@ class Relief:
     edge_radius: float | None = None
 
     def of(self, breadth: float, length: float, thickness: float) -> Palm:
-        """Return the palm of a size in metre with this relief."""
+        """Return the palm of a size in m with this relief."""
         thin = min(1.0, thickness / (2 * EDGE_RADIUS))
         corner = min(Palm.corner_radius, ROUNDEST * min(breadth, length) / 2)
         usual = {
@@ -74,8 +73,8 @@ class Phalanx:
 
     Parameters
     ----------
-    breadth, thickness : float, metre
-    cover, tip : float, metre, of soft tissue between the pad, or the tip, and the bone
+    breadth, thickness : float, m
+    cover, tip : float, m, of soft tissue between the pad, or the tip, and the bone
     """
 
     breadth: float = 0.007
@@ -95,8 +94,8 @@ class Placement:
     Parameters
     ----------
     tilt_x, tilt_y : float, rad, at most 60 degrees
-    offset : (x, y) in metre
-    lift : float, metre, towards the device
+    offset : (x, y) in m
+    lift : float, m, towards the device
     """
 
     tilt_x: float = 0.0

@@ -52,9 +52,7 @@ def _fixed_nodes(body: Body, mesh: TetMesh) -> Bools:
 
 
 def equivalent(body: Body) -> float:
-    """Return the thickness in metre of the elements, small compared with the sheet and its
-    clips.
-    """
+    """Return the thickness in m of the elements, small compared with the sheet and its clips."""
     least = SHEET_THICKNESS * min(body.width, body.height)
     reach = body.mounting.clip_radius if body.mounting.clips else 0.0
     return min(least, CLIP_THICKNESS * reach) if reach else least

@@ -21,12 +21,12 @@ THICKEST, AT = 0.1, 400.0  # coat over a shear wavelength at Hz, the highest lin
 
 
 def check_mesh(body: Body, h: float) -> None:
-    """Refuse elements of h in metre that are larger than the body, or too many."""
+    """Refuse elements of h in m that are larger than the body, or too many."""
     body.of_kind.check_size(body, check_element_size(body, h))
 
 
 def check_element_size(body: Body, h: float, slack: float = 1.0) -> float:
-    """Return the element size h in metre if a body can be meshed with it, or raise a ValueError.
+    """Return the element size h in m if a body can be meshed with it, or raise a ValueError.
 
     Elements in a layer may be `slack` times as coarse as the coarsest size that resolves it.
     """
@@ -64,12 +64,12 @@ def _check_layers(body: Body, h: float, slack: float) -> None:
 
 
 def default_size(body: Body) -> float:
-    """Return the default element size of a body, metre."""
+    """Return the default element size of a body, m."""
     return body.of_kind.default_size(body)
 
 
 def thicknesses(strata: Strata) -> list[float]:
-    """Return the thickness in metre of each stratum; that of the last is inf."""
+    """Return the thickness in m of each stratum; that of the last is inf."""
     starts = [start for start, _ in strata]
     return np.diff([*starts, inf]).tolist()
 
@@ -88,12 +88,12 @@ def without_coat(strata: Strata, count: int) -> Strata:
 
 
 def resolving_size(strata: Strata) -> float:
-    """Return the coarsest size in metre of elements that resolve layers without following them."""
+    """Return the coarsest size in m of elements that resolve layers without following them."""
     return min(thicknesses(strata)) / THINNEST
 
 
 def coarsest_size(body: Body) -> float:
-    """Return the coarsest element size in metre that resolves the layers below the coat."""
+    """Return the coarsest element size in m that resolves the layers below the coat."""
     if body.of_kind.conforming:
         return inf
     return resolving_size(without_coat(body.strata, largest_coat(body)))
@@ -107,7 +107,7 @@ def coat_count(body: Body, h: float) -> int:
 
 
 def coat(body: Body, h: float) -> Coat | None:
-    """Return the coat of a body meshed with elements of h in metre, or None."""
+    """Return the coat of a body meshed with elements of h in m, or None."""
     count = coat_count(body, h)
     if not count:
         return None
@@ -118,7 +118,7 @@ def coat(body: Body, h: float) -> Coat | None:
 
 
 def meshed_strata(body: Body, h: float) -> Strata:
-    """Return the strata in the mesh of a body with elements of h in metre."""
+    """Return the strata in the mesh of a body with elements of h in m."""
     return without_coat(body.strata, coat_count(body, h))
 
 

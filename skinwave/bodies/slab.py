@@ -95,7 +95,7 @@ def _depth_line(body: Body, h: float) -> Floats:
 
 
 def cell_layers(body: Body, h: float) -> int:
-    """Return the number of cells of h in metre through the depth of a slab."""
+    """Return the number of cells of h in m through the depth of a slab."""
     return len(_depth_line(body, h)) - 1
 
 

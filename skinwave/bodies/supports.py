@@ -118,10 +118,10 @@ class Mounting:
     ----------
     edges : names of the held edges: left, right, front, back
     support : "clamped", or "simply" for held edges that may turn
-    clips : (x, y) in metre, middles of clips, squares along the sides in which nothing moves
-    clip_radius : float, metre, half a side of these squares
+    clips : (x, y) in m, middles of clips, squares along the sides in which nothing moves
+    clip_radius : float, m, half a side of these squares
     tension_x, tension_y : float, N/m, uniform, 0 or above
-    curl_x, curl_y : float, metre, height of the middle above the edges, between left and right and
+    curl_x, curl_y : float, m, height of the middle above the edges, between left and right and
         between front and back; the sheet is an unstressed parabola
 
     Raises a ValueError if a value is unknown or out of range, or the sheet is unconstrained.
@@ -204,9 +204,7 @@ FRAME = Mounting()
 
 
 def check_extent(mounting: Mounting, width: float, height: float) -> None:
-    """Refuse clips outside a sheet of a width and height in metre, and a curl that is not
-    shallow.
-    """
+    """Refuse clips outside a sheet of a width and height in m, and a curl that is not shallow."""
     for name, side in (("curl_x", width), ("curl_y", height)):
         most = 1e3 * STEEPEST * side
         cure = ", the limits of a shallow shell; reduce it"
@@ -220,8 +218,7 @@ def check_extent(mounting: Mounting, width: float, height: float) -> None:
 
 
 def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
-    """Return grid lines in metre along an axis of a sheet: the sides of its clips, and lines near
-    them.
+    """Return grid lines in m along an axis of a sheet: the sides of its clips, and lines near them.
 
     The curvature is unbounded at the corners of clips.
     """

@@ -25,7 +25,7 @@ STIFFEST = 1e6  # stiffness of bone, over the shear stiffness of the whole thick
 
 
 def hand_size(body: Body) -> float:
-    """Return the default element size of a hand, metre, for any depth."""
+    """Return the default element size of a hand, m, for any depth."""
     return min(HAND_CELL, max(coarsest_size(body), FINE_PALM))
 
 
@@ -35,7 +35,7 @@ def in_tissue_layers(
     mesh: TetMesh,
     rest: Callable[[TetMesh], fem.Support] | None = None,
 ) -> Discretised:
-    """Return the body of a mesh with elements of h in metre, with its layers, regions, coat and
+    """Return the body of a mesh with elements of h in m, with its layers, regions, coat and
     support.
 
     `rest` is the support of a mesh; by default it acts below, by the normals of the facets.
@@ -87,9 +87,7 @@ def _shear_stiffness(body: Body, mesh: TetMesh) -> float:
 
 
 def depths(mesh: TetMesh) -> Floats:
-    """Return the depth (m,) in metre of the middle of each tetrahedron below the top, along the
-    beam.
-    """
+    """Return the depth (m,) in m of the middle of each tetrahedron below the top, along the beam."""
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
     top = mesh.points[np.unique(mesh.facets["top"])]

@@ -59,8 +59,8 @@ def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict
 
 def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
     """Return the curves of a measurement, averaged over its repetitions: name, quantity, remarks,
-    `places` [[x, y] in metre or null], and `times` in s with `values` in SI units by place and
-    time, or `frequencies` in Hz with `amplitudes` by place and frequency.
+    `places` [[x, y] in m or null], and `times` in s with `values` in SI units by place and time, or
+    `frequencies` in Hz with `amplitudes` by place and frequency.
     """
     from skinwave.measure.reading import read
 

@@ -43,7 +43,7 @@ NEGLIGIBLE = 1e-4  # relative RMS motion that the basis may miss
 
 
 def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str, Any]:
-    """Return the pack of a body of finite elements of size `h` in metre, as a dict for JSON."""
+    """Return the pack of a body of finite elements of size `h` in m, as a dict for JSON."""
     progress("mesh", 0.0)
     body = relaxing(body, FIT_TOLERANCE)
     made = build(body, h)
@@ -68,7 +68,7 @@ def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str,
 
 
 def training_knots(body: Body) -> Floats:
-    """Return places (j, 2) in metre of focal spots all over the area, on a triangular grid."""
+    """Return places (j, 2) in m of focal spots all over the area, on a triangular grid."""
     rows = int(2 * REACH / (SPACING * 0.75**0.5)) + 1
     half = np.array([body.width, body.height]) / 2 if body.of_kind.is_bounded else np.full(2, REACH)
     grid = [
@@ -128,8 +128,8 @@ def reduced_poles(ops: fem.Operators, basis: np.ndarray) -> tuple[fem.Complex, f
 
 
 def surface_grid(body: Body, made: Build) -> tuple[Floats, np.ndarray, Floats, Floats]:
-    """Return the places (SIDE^2, 2) in metre of the grid, whether they are on the body, and the
-    cosine of the slope and the height in metre of the surface there, (SIDE^2,) each.
+    """Return the places (SIDE^2, 2) in m of the grid, whether they are on the body, and the cosine
+    of the slope and the height in m of the surface there, (SIDE^2,) each.
     """
     from scipy.interpolate import LinearNDInterpolator  # slow to import
 

@@ -25,7 +25,7 @@ SMALLEST, HIGHEST = 0.01, 1000.0
 SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS = 0.3, 200.0
 SHAPES = ("point", "line", "circle", "triangle", "square")
 DRIVES = ("pressure_squared", "force_corrected", "linear")
-# Places in metre at which the exact model of a body of elements is prepared.
+# Places in m at which the exact model of a body of elements is prepared.
 PLACES = ((0.0, 0.0), (0.006, -0.002), (-0.011, 0.007), (0.004, 0.016), (0.02, -0.012))
 
 Lines = Callable[[Scene], tuple[Floats, Complex]]
@@ -37,7 +37,7 @@ def selftest(
     body: Body, name: str, count: int, lowest: float, error: float
 ) -> list[dict[str, Any]]:
     """Return random Tactons on a body with their steady lines at a point: records of the body's
-    name, the values, the lines [{f in Hz, re, im in metre}] and the allowed relative error.
+    name, the values, the lines [{f in Hz, re, im in m}] and the allowed relative error.
     """
     rng = np.random.default_rng(SEED)
     records: list[dict[str, Any]] = []
@@ -62,9 +62,9 @@ def selftest(
 
 
 def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
-    """Return a model of a body that does not use its pack: functions of a scene with one probe
-    that give its lines, frequencies (f,) in Hz and amplitudes (f,) in metre, and its motion (t,)
-    from rest; and the places (p, 2) in metre where it is known, () for any.
+    """Return a model of a body that does not use its pack: functions of a scene with one probe that
+    give its lines, frequencies (f,) in Hz and amplitudes (f,) in m, and its motion (t,) from rest;
+    and the places (p, 2) in m where it is known, () for any.
     """
     method = method_of(body)
     if method != "poles":
@@ -98,8 +98,8 @@ def _lines_of_sheet(scene: Scene) -> tuple[Floats, Complex]:
 def random_scene(
     body: Body, rng: np.random.Generator, lowest: float = LOWEST, places: Places = ()
 ) -> Scene:
-    """Return a scene of a random Tacton that the controls can set, with the focus at `lowest` in
-    metre or higher and the probe at one of the places, () for any.
+    """Return a scene of a random Tacton that the controls can set, with the focus at `lowest` in m
+    or higher and the probe at one of the places, () for any.
     """
     bounded = body.of_kind.is_bounded
     half = min(0.025, *((body.width / 2, body.height / 2) if bounded else ()))

@@ -33,7 +33,7 @@ SAMPLED = (0.0, 600.0, 1000.0)  # Hz at which these combinations are sampled
 
 
 def grid_line() -> Floats:
-    """Coordinates (SIDE,) in metre of the grid of fields along each side."""
+    """Coordinates (SIDE,) in m of the grid of fields along each side."""
     return np.asarray(STEP * (np.arange(SIDE) - (SIDE - 1) / 2))
 
 
@@ -101,8 +101,8 @@ def _bending(modes: PlateModes, turn: Floats) -> Floats:
 
 
 def spot_forces(fields: Floats, width: float) -> Floats:
-    """Return the forces (m, SIDE^2) of a focal spot of 1 Pa and this width in metre at each place
-    of the grid. Sums over the places approximate integrals of smooth fields (m, SIDE^2).
+    """Return the forces (m, SIDE^2) of a focal spot of 1 Pa and this width in m at each place of
+    the grid. Sums over the places approximate integrals of smooth fields (m, SIDE^2).
     """
     distance = np.subtract.outer(grid_line(), grid_line())
     spot = STEP * np.exp(-(distance**2) / (2 * width**2))

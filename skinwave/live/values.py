@@ -143,7 +143,7 @@ def _own_paths(tacton: Tacton) -> tuple[Trajectory, ...]:
 
 
 def _shape_of(corners: np.ndarray) -> Trajectory:
-    """The named shape with corners (k, 2) in metre, the first of which is repeated at the end."""
+    """The named shape with corners (k, 2) in m, the first of which is repeated at the end."""
     shape = CORNERS[len(corners)]
     x, y = corners[:-1].mean(axis=0)
     side = float(np.linalg.norm(corners[1] - corners[0]))

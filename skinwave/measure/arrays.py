@@ -258,7 +258,7 @@ def _rate(arrays: Arrays) -> float:
 
 
 def _places(arrays: Arrays) -> Floats:
-    """Return places (p, 2) in metres from the first two coordinates; (0, 2) if there are none."""
+    """Return places (p, 2) in m from the first two coordinates; (0, 2) if there are none."""
     for name in (*PLACES, *MILLIMETRES):
         array = arrays.get(name, np.empty(0))
         if array.dtype.kind not in "fiu" or array.ndim != 2 or not {2, 3} & set(array.shape):

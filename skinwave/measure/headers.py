@@ -71,7 +71,7 @@ UNITS = {canonical(unit) for unit in _SUFFIXES.values()} | {
 @dataclass(frozen=True, kw_only=True)
 class Column:
     """Column of a table: its heading `text`, `role` ("" if unknown), `part` of a complex amplitude
-    ("" for real values), `place` in metres (nan if unknown), `repetition` from 1, and `unit`.
+    ("" for real values), `place` in m (nan if unknown), `repetition` from 1, and `unit`.
     """
 
     text: str
@@ -153,7 +153,7 @@ def _split_suffix(name: str) -> tuple[str, str]:
 
 
 def _place(text: str) -> tuple[float, float]:
-    """Return the place in metres of "5,0", in mm unless a unit follows: "0.005,0 m"."""
+    """Return the place in m of "5,0", in mm unless a unit follows: "0.005,0 m"."""
     coordinates, _, unit = text.strip().rpartition(" ")
     if canonical(unit) not in LENGTHS:
         coordinates, unit = text, "mm"

@@ -19,7 +19,7 @@ class Measurement:
     ----------
     quantity : str, name of one of `simple_model.quantities.QUANTITIES`, normal to the body and
         positive into it
-    places : (p, 2) float, metre, in the plane of the body; nan if unknown
+    places : (p, 2) float, m, in the plane of the body; nan if unknown
     times : (t,) float, s, rising in equal steps; empty for spectra
     frequencies : (f,) float, Hz, rising; empty for waveforms
     values : (r, t, p) float or, for spectra, (r, f, p) complex, in SI: r repetitions; a spectrum
@@ -72,7 +72,7 @@ class Measurement:
             raise ValueError("a measurement has either times or frequencies; give one of them")
         shape, count = self.places.shape, len(self.axis)
         if len(shape) != 2 or shape[1] != 2:
-            raise ValueError(f"places of a measurement have shape {shape}; give (p, 2) in metre")
+            raise ValueError(f"places of a measurement have shape {shape}; give (p, 2) in m")
         expected = (max(len(self.values), 1), count, len(self.places))
         if self.values.shape != expected:
             shape = self.values.shape

@@ -151,7 +151,7 @@ def _reader(path: Path) -> Reader:
 
 
 def parse_places(words: str) -> Floats:
-    """Return places (p, 2) in metres from "0,0 5,0" in mm, or from a text file."""
+    """Return places (p, 2) in m from "0,0 5,0" in mm, or from a text file."""
     if Path(words).is_file():
         return text.read_places(Path(words))
     places = []

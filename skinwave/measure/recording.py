@@ -31,7 +31,7 @@ class Given:
     ----------
     quantity : "displacement", "velocity", "acceleration" or another of `QUANTITIES`
     unit : "mm/s", "um", "g", ...; "20 mm/s" if 1 in the file stands for 20 mm/s
-    places : (p, 2) float, metre
+    places : (p, 2) float, m
     sign : 1 if positive values are into the body, -1 if out of it
     rate : Hz, replaces the steps of the file's times; the first sample stays as many steps from 0
     variable : name of the array of motion in a file with several
@@ -65,7 +65,7 @@ class Recording:
     rate: float = float("nan")  # Hz, of samples without times
     quantity: str = ""
     unit: str = ""
-    places: Floats  # (p, 2) metre, nan if unknown
+    places: Floats  # (p, 2) m, nan if unknown
     drive: np.ndarray = field(default_factory=lambda: np.empty(0))  # (t,) or (f,)
     sign: int = 0  # 1 into the body, -1 out of it, 0 unknown
     name: str = ""

@@ -334,7 +334,7 @@ def _drive(table: Table) -> np.ndarray:
 
 
 def coordinates(table: Table) -> Floats:
-    """Return the places (n, 2) in metres of the columns x and y."""
+    """Return the places (n, 2) in m of the columns x and y."""
     at = table.index(X), table.index(Y)
     for k in at:
         if not table.columns[k].unit:

@@ -46,7 +46,7 @@ def read(path: Path, given: Given) -> Recording:
 
 
 def read_places(path: Path) -> Floats:
-    """Return places (p, 2) in metres from the columns x and y, or from two columns in mm."""
+    """Return places (p, 2) in m from the columns x and y, or from two columns in mm."""
     table = parse_table(read_exported_text(path, LARGEST))
     if len(table.columns) == 2 and not any(column.text for column in table.columns):
         table = replace(table, columns=(parse_heading("x [mm]"), parse_heading("y [mm]")))

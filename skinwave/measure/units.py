@@ -100,7 +100,7 @@ def divisor(unit: str, units: dict[str, float], dimension: str) -> float:
 
 
 def metres(text: str, unit: str) -> float:
-    """Return a decimal number in a unit of length in metres, exactly rounded."""
+    """Return a decimal number in a unit of length in m, exactly rounded."""
     try:
         return float(Decimal(text.strip()) / Decimal(divisor(unit, LENGTHS, "length")))
     except InvalidOperation:

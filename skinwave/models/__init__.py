@@ -62,9 +62,9 @@ class Model:
     solve : function of a scene, times (t,) in s equally spaced from 0, and options to the response
     limits : function of a scene with a body to each `Limit` that it exceeds; by default the model
         computes only the displacement of the surface under a pressure
-    error : function of scene and element size in metre to the expected relative error, nan if
-        unknown; None for linear waves, whose error a plan estimates
-    default_size : function of a body to its element size in metre; None without a mesh
+    error : function of scene and element size in m to the expected relative error, nan if unknown;
+        None for linear waves, whose error a plan estimates
+    default_size : function of a body to its element size in m; None without a mesh
     seconds, memory : predicted cost of a first response in s and bytes, unless a plan measures it
     colour : str, of figures
     sources : tuple of str, references of its method

@@ -71,7 +71,7 @@ def fields_read(scene: Scene, depth: float) -> tuple[Field, ...]:
 
 
 def field_read(scene: Scene, depth: float) -> Field:
-    """Return the field under a pressure of the quantity that a scene reads, at a depth in metre."""
+    """Return the field under a pressure of the quantity that a scene reads, at a depth in m."""
     if scene.body.of_kind.is_layer:
         return quantity_field(scene.reading.record, stack(scene.body), depth)
     return surface_field(scene.reading.record, compliance(scene.body))

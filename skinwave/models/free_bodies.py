@@ -36,8 +36,8 @@ INDEPENDENT = 1e-9  # of the largest pivot: functions with smaller ones are sums
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Range:
     """Bodies of a range: function `body` of shares (k,), 0 to 1. The body at the shares `meshed`
-    (k,) is meshed with elements of `h` in metre, or its default size, and its nodes are `moved` to
-    the thicknesses of others.
+    (k,) is meshed with elements of `h` in m, or its default size, and its nodes are `moved` to the
+    thicknesses of others.
 
     Matrices are sums over `_terms` of the thicknesses. They are assembled at the shares
     `geometries` (g, k), where the independent terms, of index `chosen` (g,), have the values
@@ -109,7 +109,7 @@ def build_at(bodies: Range, at: Sequence[float], symmetry: str = "") -> Build:
 
 
 def _terms(body: Body) -> Floats:
-    """Return 1, and d and 1/d for the thickness d in metre of each stratum."""
+    """Return 1, and d and 1/d for the thickness d in m of each stratum."""
     d = np.diff(body.interfaces)
     return np.concatenate([[1.0], d, 1 / d])
 

@@ -59,7 +59,7 @@ MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
 
 @lru_cache(maxsize=64)
 def mesh_limits(body: Body, h: float | None = None) -> tuple[Limit, ...]:
-    """Return the limits of elements of h in metre, by default those of the body."""
+    """Return the limits of elements of h in m, by default those of the body."""
     if not isfinite(body.depth):
         why = "needs a body of finite depth, not thickness_mm = inf"
         return (Limit(why=why, cure="set a finite thickness_mm", change=_with_finite_depth),)
@@ -189,8 +189,8 @@ def march(
     stored: Callable[[fem.State], float],
     report: Progress,
 ) -> tuple[Floats, tuple[float, float]]:
-    """Return the readings (steps + 1, p) of displacements (3 n,) in metre in a time integration,
-    and its last `energy_balance`, with the energy in J that is `stored` in a state.
+    """Return the readings (steps + 1, p) of displacements (3 n,) in m in a time integration, and
+    its last `energy_balance`, with the energy in J that is `stored` in a state.
 
     Raises `fem.Diverged` if a state that is checked violates the balance.
     """

@@ -83,7 +83,7 @@ def energy_balance(
 
 
 def with_cost(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
-    """Return the effort with time, memory, versions, and the mesh with its size in metre."""
+    """Return the effort with time, memory, versions, and the mesh with its size in m."""
     return replace(
         effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
         mesh=cache.digest(build.mesh.points, build.mesh.tets),
@@ -92,7 +92,7 @@ def with_cost(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
 
 def surface_load(build: Build, load: Load = PRESSURE) -> tuple[sparse.csr_array, Floats]:
     """Return the load operator P (3 n, c k), nodal forces in N of the c components of a load in Pa
-    on a surface across the beam, and the points (k, 3) in metre where it takes each component.
+    on a surface across the beam, and the points (k, 3) in m where it takes each component.
     """
     normals, points = facet_normals(build.mesh), facet_points(build.mesh)
     each = [traction_operator(build.mesh, t) for t in load.tractions(normals)]
@@ -172,7 +172,7 @@ def with_sag(components: Floats, sag: Floats | float, quantity: Quantity) -> Flo
 
 def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array:
     """Return the probe operator S (p, 3 n) of the displacement into a meshed body at probes (p, 2)
-    in metre.
+    in m.
 
     The surface of a file consists of flat triangles, whose normals jump at edges. There the
     direction into the body is that of the mean normal around a probe.
@@ -184,7 +184,7 @@ def probe_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
     """Return the probe operator S (p c, 3 n) of the c components of a quantity at rest at probes
-    (p, 2) in metre, and the material at each probe, or () if the quantity does not depend on it.
+    (p, 2) in m, and the material at each probe, or () if the quantity does not depend on it.
 
     Raises a ValueError if a probe is not in the body, or its strain in a coat.
     """
@@ -244,7 +244,7 @@ def mirrored_axes(body: Body, reading: Reading, load: Load) -> str:
 
 
 def axes_of_probes(probes: Floats, among: str) -> str:
-    """Return the axes, of some of "xy", on whose middle planes all probes (p, 2) in metre lie."""
+    """Return the axes, of some of "xy", on whose middle planes all probes (p, 2) in m lie."""
     return "".join(axis for axis in among if np.abs(probes[:, "xy".index(axis)]).max() < ON_PLANE)
 
 
@@ -266,8 +266,8 @@ def images(probes: Floats, axes: str) -> Floats:
 
 def even_part(P: sparse.csr_array, points: Floats, axes: str) -> tuple[sparse.csr_array, Floats]:
     """Return the load operator (3 n, j k) of the even part of a load across some axes, on the half
-    of a body with positive coordinates: it takes the load at the points (k, 3) of an operator
-    P (3 n, k) and at their mirror images, together points (j k, 3) in metre.
+    of a body with positive coordinates: it takes the load at the points (k, 3) of an operator P
+    (3 n, k) and at their mirror images, together points (j k, 3) in m.
     """
     for axis in axes:
         image = points.copy()

@@ -27,7 +27,7 @@ class SolveOptions:
     ----------
     model : str, a name of `models.names()`; "auto" selects the cheapest within the tolerance
     tolerance : float, 0..1, acceptable relative error; reduction takes at most a fiftieth of it
-    h : float, metre, element size; planned if not given, and with it the extent of the body
+    h : float, m, element size; planned if not given, and with it the extent of the body
     dt : float, s, time step of "fem-transient" and the nonlinear models; chosen if not given
     solver : str, a backend of `fem.linear_solver`, or "auto"
     times : (t,) float, s, equally spaced within the duration, the first a multiple of their step;

@@ -87,7 +87,7 @@ class ParametricBody:
     reference : Reference, the body that was meshed
     model : AffineModel, reduced model of g geometries, with outputs (g, p c, r) at the probes
     forces : (g, c k, r) reduced forces of unit pressure
-    points : (g, k, 3) surface points in metre where the load is taken
+    points : (g, k, 3) surface points in m where the load is taken
     frequencies : (f,) in Hz of the lines
     bases : (f,) AffineModel, smaller models of the lines
     effort : Effort of the offline stage, with the number of its factorisations
@@ -129,7 +129,7 @@ def prepare(
         "body.layers.0.material.viscosity_pa_s" -> its least and largest value, in the file's unit
     tolerance : float, relative error of each line of the load at the probes
     progress : called with the name of the phase and the fraction done
-    h : float, metre, element size; the default of the body if not given
+    h : float, m, element size; the default of the body if not given
     solver : a backend of `fem.linear_solver`
 
     Returns

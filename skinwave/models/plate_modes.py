@@ -112,7 +112,7 @@ def steady_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respons
 
 def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Complex]:
     """Return frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity in the
-    steady state, at places (p, 2) in metre or at its probes. Raises a ValueError for a load without
+    steady state, at places (p, 2) in m or at its probes. Raises a ValueError for a load without
     lines.
     """
     driven = _drive(scene, sample_times(scene), SolveOptions())

@@ -59,11 +59,11 @@ class ReducedBody:
 
     The `poles` of the reduced model define its coordinates (r,), in which the model has a `damping`
     (r, r), `radiation` (r, r), and Maxwell `branches` (r, r). The `forces` (c k, r) are those of
-    unit pressure of the c components of the `load` at the surface `points` (k, 3) in metre. On a
+    unit pressure of the c components of the `load` at the surface `points` (k, 3) in m. On a
     support that moves, coordinates are relative to the support, and `inertia` (r,) is the inertial
     force per acceleration.
 
-    The `probes` (p, 2) in metre read the quantity of `reading`. Its components at rest are `read`
+    The `probes` (p, 2) in m read the quantity of `reading`. Its components at rest are `read`
     (p c, r) of the coordinates, `sag` (p c,) under gravity, and `translation` (p c,) for 1 m of
     support motion. The materials of the probes are `solids`, if the quantity depends on them. The
     `effort` is that of the offline stage.
@@ -88,7 +88,7 @@ class ReducedBody:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedResponse:
-    """Response from rest, in reduced coordinates or in metre at outputs.
+    """Response from rest, in reduced coordinates or in m at outputs.
 
     The steady state has complex `lines` (f, q) at `frequencies` (f,) in Hz, and the free vibration
     of the start complex amplitudes `start` (m, q) at `poles` (m,) in 1/s. `imbalance` is the
@@ -120,10 +120,10 @@ def prepare(
     """Mesh, assemble, factorise and reduce a body, once for all Tactons and, by the cache, once per
     machine.
 
-    If all probes (p, 2) in metre lie on a symmetry plane of the body, one half is modelled.
-    `progress`, `h` and `solver` are as in `SolveOptions`; `tolerance` is the relative error of the
-    reduction; `symmetry`, the axes across which all loads are symmetric, applies to normal motion
-    under a pressure, and `discretise` replaces the mesh of the body's kind.
+    If all probes (p, 2) in m lie on a symmetry plane of the body, one half is modelled. `progress`,
+    `h` and `solver` are as in `SolveOptions`; `tolerance` is the relative error of the reduction;
+    `symmetry`, the axes across which all loads are symmetric, applies to normal motion under a
+    pressure, and `discretise` replaces the mesh of the body's kind.
     """
     clock, report = Clock(), progress or silent
     body = relaxing(body, SERIES_ERROR * tolerance)

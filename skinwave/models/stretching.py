@@ -60,17 +60,17 @@ MOST_LINES = 500  # of a load that are summed in each step
 
 
 def stretching_size(body: Body, *, reduced: bool) -> float:
-    """Return the default element size in metre of a sheet at large deflection."""
+    """Return the default element size in m of a sheet at large deflection."""
     return min(body.width, body.height) / (REDUCED_CELLS if reduced else FULL_CELLS)
 
 
 def expected_error(body: Body, h: float) -> float:
-    """Return the error of a waveform with elements of h in metre, as measured on a paper sheet."""
+    """Return the error of a waveform with elements of h in m, as measured on a paper sheet."""
     return min(1.0, COARSE_ERROR * (h * FULL_CELLS / min(body.width, body.height)) ** ERROR_ORDER)
 
 
 def meshed_sheet(body: Body, h: float) -> Build:
-    """Return the mesh of the equivalent sheet in cells of h in metre, with a thickness to match."""
+    """Return the mesh of the equivalent sheet in cells of h in m, with a thickness to match."""
     thickness = min(STOCKY * h, STOUTEST * min(body.width, body.height))
     return build(body, h, discretise=partial(discretise, thickness=thickness))
 

@@ -113,7 +113,7 @@ def _playhead(runs: Floats, count: int) -> tuple[Floats, Floats]:
 
 
 def _record(t: Floats, places: Floats, levels: Floats) -> Tacton:
-    """Return a Tacton of a focus at places (t, 2) in metre with levels (t,)."""
+    """Return a Tacton of a focus at places (t, 2) in m with levels (t,)."""
     kept = thin(t, places, levels)
     path = Trajectory(
         shape="recorded", times=tuple(np.round(t[kept], 9).tolist()),
@@ -139,7 +139,7 @@ def _is_simple(brush: Brush) -> bool:
 
 
 def _constant(brush: Brush, place: Floats, notes: list[str]) -> Tacton:
-    """Return the Tacton of a simple brush at a place in millimetre."""
+    """Return the Tacton of a simple brush at a place in mm."""
     (x, y), size, f_d = place[:2] / 1e3, brush.numbers[0] / 1e3, brush.drawing_frequency
     path = Trajectory(centre=(x, y))
     if size and brush.name == "circle":
@@ -172,8 +172,8 @@ def _keyframe_before(track: Track, t: Floats) -> tuple[np.ndarray, Floats]:
 
 
 def _brush_at(track: Track, p: Floats, t: Floats) -> tuple[Floats, Floats]:
-    """Return offsets (t, 2) in millimetre of the focus, and cycles (t,) of the AM, at times p (t,)
-    of the track and t (t,) of the clock in s.
+    """Return offsets (t, 2) in mm of the focus, and cycles (t,) of the AM, at times p (t,) of the
+    track and t (t,) of the clock in s.
 
     Numbers of brushes of one kind are interpolated, of a lissajous only its rotation. A brush stays
     constant until one of another kind.
@@ -194,7 +194,7 @@ def _brush_at(track: Track, p: Floats, t: Floats) -> tuple[Floats, Floats]:
 
 
 def _offset(name: str, cycles: Floats, numbers: list[Floats]) -> Floats:
-    """Return the offsets (t, 2) in millimetre of a brush after cycles (t,)."""
+    """Return the offsets (t, 2) in mm of a brush after cycles (t,)."""
     u = 2 * pi * np.mod(cycles, 1.0)
     if name == "circle":
         return numbers[0][:, None] * np.stack([np.cos(u), np.sin(u)], axis=-1)

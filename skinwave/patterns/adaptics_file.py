@@ -1,5 +1,5 @@
 """Reader of .adaptics files of the AdapTics designer and engine (CHI '24): keyframes, numbers with
-parameters, brushes. Units are millisecond, millimetre and Hz.
+parameters, brushes. Units are ms, mm and Hz.
 """
 
 import json
@@ -56,9 +56,9 @@ class Track:
 class Animation:
     """Contents of a file for given values of its parameters.
 
-    The tracks have places (x, y, z) in millimetre above the array, brushes, and intensities, which
-    a `factor` multiplies. `runs` are intervals (start, end) in s in the order of playback; `loop`
-    is the index of the run that follows the last one for ever, or None.
+    The tracks have places (x, y, z) in mm above the array, brushes, and intensities, which a
+    `factor` multiplies. `runs` are intervals (start, end) in s in the order of playback; `loop` is
+    the index of the run that follows the last one for ever, or None.
     """
 
     name: str

@@ -80,7 +80,7 @@ def _check(scene: Scene) -> None:
 
 
 def _path(scene: Scene) -> tuple[Floats, Floats, Floats]:
-    """Return times (k,) in s, places (k, 2) in metre and levels (k,) of the keyframes of a path."""
+    """Return times (k,) in s, places (k, 2) in m and levels (k,) of the keyframes of a path."""
     path, end = scene.tacton.trajectory, scene.tacton.duration
     f_d, ahead = path.drawing_frequency, scene.tacton.foci[0]
     corners = np.add.outer(np.arange(int(end * f_d) + 3) - 1, path.parts[0]).ravel() - ahead
@@ -99,7 +99,7 @@ def _path(scene: Scene) -> tuple[Floats, Floats, Floats]:
 
 
 def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
-    """Return the brush that draws a path, or None, and its place in metre."""
+    """Return the brush that draws a path, or None, and its place in m."""
     path = tacton.trajectory
     if path.shape == "circle" and tacton.foci[0] == 0:
         radius = {"radius": 1e3 * path.size / 2}

@@ -77,7 +77,7 @@ def read(content: bytes, options: Options) -> Pattern:
 
 
 def tacton_of(times: Floats, places: Floats, levels: Floats, *, hold: bool = False) -> Tacton:
-    """Return a Tacton of foci at places (n, t, 2) in metre with levels (n, t) at times (t,) in s.
+    """Return a Tacton of foci at places (n, t, 2) in m with levels (n, t) at times (t,) in s.
 
     The last sample lasts as long as the one before it.
     """

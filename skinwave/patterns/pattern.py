@@ -37,7 +37,7 @@ class Options:
     Parameters
     ----------
     rate : Hz, of the samples of a CSV that is read without times or written
-    height : metre, of the focus, in place of that in the file
+    height : m, of the focus, in place of that in the file
     hold : whether a focal point stays until the next sample, or else moves straight
     role : "modulation" or "envelope", the meaning of a WAV
     scale : "full", "peak" or "rms", of the samples of a WAV: as stored, or scaled to a peak of 1,
@@ -100,7 +100,7 @@ def aliasing_notes(tacton: Tacton, rate: float) -> list[str]:
 
 def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float]:
     """Return the pressure key of the height: that of the options, or the common one of foci at z
-    (k,) in metre; raise a ValueError if they differ.
+    (k,) in m; raise a ValueError if they differ.
     """
     if options.height is not None:
         return {"height": options.height}
@@ -116,8 +116,8 @@ def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float
 
 
 def thin(t: Floats, places: Floats, levels: Floats) -> np.ndarray:
-    """Return indices (k,) of samples such that straight lines between them are within `STRAIGHT`
-    of all places (t, 2) in metre and levels (t,) at times (t,).
+    """Return indices (k,) of samples such that straight lines between them are within `STRAIGHT` of
+    all places (t, 2) in m and levels (t,) at times (t,).
     """
     values = np.column_stack([places / STRAIGHT[0], levels / STRAIGHT[1]])
     kept, before = np.arange(len(t)), 0

@@ -23,7 +23,7 @@ from skinwave.planning.plan_warnings import response_warnings
 from skinwave.scene.scene import Body, Load, Reading, Scene
 from skinwave.typing import Array
 
-Coarser = tuple[float, ReducedBody]  # element size in metre, and the body with it
+Coarser = tuple[float, ReducedBody]  # element size in m, and the body with it
 
 COARSE_RATIO = 2.0  # of the element size of the mesh to compare with, over a default one
 
@@ -41,7 +41,7 @@ def assess(
 
     `moved` is the reduced body of the response, or the quantity of interest of another model:
     waveforms (t, p), or the lines (f, p) of an unconstrained body. `compared` is an element size in
-    metre to compare with and the body with it; chosen here if not given. `meshed` is the body whose
+    m to compare with and the body with it; chosen here if not given. `meshed` is the body whose
     mesh both sizes are of, if nodes were moved to the scene's body.
     """
     if isinstance(moved, ReducedBody):
@@ -72,7 +72,7 @@ def assess(
 
 
 def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
-    """Return the element size in metre that `assess` compares with, and the body on that mesh."""
+    """Return the element size in m that `assess` compares with, and the body on that mesh."""
     body, h = scene.body, options.h
     other = refinement.comparison_size(body, h) if h else _coarser_size(body, default_size(body))
     reduction = reduction_tolerance(options.tolerance)
@@ -83,8 +83,8 @@ def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
 def all_warnings(
     scene: Scene, response: Response, tolerance: float = 0.05, h: float | None = None
 ) -> tuple[str, ...]:
-    """Return all warnings of a response without solving another mesh: of linear elements of h in
-    metre those that do not depend on their error, of other models those of their plan.
+    """Return all warnings of a response without solving another mesh: of linear elements of h in m
+    those that do not depend on their error, of other models those of their plan.
     """
     if named(response.model).default_size and h:
         warnings, predicted = errors.element_warnings(scene, h, 0.0), 0.0
@@ -96,7 +96,7 @@ def all_warnings(
 
 
 def _coarser_size(body: Body, h: float) -> float:
-    """Return a size in metre to compare a default one with at little cost, if it has a mesh."""
+    """Return a size in m to compare a default one with at little cost, if it has a mesh."""
     try:
         check_mesh(body, COARSE_RATIO * h)
     except ValueError:

@@ -48,7 +48,7 @@ def element_parts(
     scene: Scene, tolerance: float, h: float, *,
     mesh: float, reduction: float, absorbing: float, above_band: float,
 ) -> list[ErrorPart]:  # fmt: skip
-    """Return the parts of linear elements of h in metre, from the relative error of each cause."""
+    """Return the parts of linear elements of h in m, from the relative error of each cause."""
     size = 1e3 * enough(scene.body, h, mesh, tolerance)
     return [
         ErrorPart(source=f"elements of {1e3 * h:.3g} mm", error=mesh,
@@ -60,7 +60,7 @@ def element_parts(
 
 
 def element_warnings(scene: Scene, h: float, mesh: float) -> tuple[str, ...]:
-    """Return other warnings of elements of h in metre, whose relative error is `mesh` or nan."""
+    """Return other warnings of elements of h in m, whose relative error is `mesh` or nan."""
     return (
         *(() if isfinite(mesh) else (ERROR_UNKNOWN,)),
         *rigid_body_drift(scene),

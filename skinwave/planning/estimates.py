@@ -70,7 +70,7 @@ def has_wavenumber_solution(scene: Scene) -> bool:
 
 
 def spot_scale(pressure: MovingPressure) -> float:
-    """Return the standard deviation in metre of a Gaussian as wide as the focal spot."""
+    """Return the standard deviation in m of a Gaussian as wide as the focal spot."""
     return _width(pressure) or spot_width(pressure.height)
 
 
@@ -122,8 +122,8 @@ def _loss_at_cut_off(body: Body) -> float:
 
 
 def absorbing_reflection(scene: Scene, half: Floats, highest: float) -> float:
-    """Return the reflection of absorbing sides at distances `half` (2,) in metre from the middle,
-    over the steady motion of the probes; 1, for unknown, for a body with too little loss.
+    """Return the reflection of absorbing sides at distances `half` (2,) in m from the middle, over
+    the steady motion of the probes; 1, for unknown, for a body with too little loss.
 
     The wavenumber integral of the infinite body gives the motion by mirror images of the focus in
     the four sides, for lines of the load up to the `highest` in Hz.
@@ -165,13 +165,13 @@ def _reflecting(body: Body, images: list[Floats]) -> list[Floats]:
 
 
 def _to_edge(scene: Scene, half: Floats) -> float:
-    """Return the distance in metre from the path or the probes to the nearest side."""
+    """Return the distance in m from the path or the probes to the nearest side."""
     points = np.vstack([path_places(scene.tacton.trajectory), scene.probe_points])
     return float((half - np.abs(points).max(axis=0)).min())
 
 
 def path_places(path: Trajectory) -> Floats:
-    """Return some positions (k, 2) in metre of the focus."""
+    """Return some positions (k, 2) in m of the focus."""
     if path.shape in BY_POINTS:
         return path.outline[:: max(1, len(path.points) // 24)]
     return path.at_phase(np.arange(24) / 24)

@@ -195,9 +195,9 @@ def deflection_ratio(scene: Scene, response: Response) -> float:
 
 
 def mean_sag(scene: Scene) -> float:
-    """Return the linear deflection in metre of the middle of a held sheet under its mean load,
-    applied there: 0.0056 F a^2 / D for a clamped square (Timoshenko and Woinowsky-Krieger 1959,
-    table 37); by the modes of the plate for other supports, and orthotropic or stretched sheets.
+    """Return the linear deflection in m of the middle of a held sheet under its mean load, applied
+    there: 0.0056 F a^2 / D for a clamped square (Timoshenko and Woinowsky-Krieger 1959, table 37);
+    by the modes of the plate for other supports, and orthotropic or stretched sheets.
     """
     body = scene.body
     if body.mounting == FRAME and body.solid.orthotropy is None:

@@ -29,7 +29,7 @@ class Plan:
     model : str, name of the model
     body : Body, the part of the scene's body that is modelled
     symmetry : str, axes of "xy" across which the body is halved
-    h : float or None, element size in metre; None without a mesh
+    h : float or None, element size in m; None without a mesh
     highest : float, highest relevant line of the load in Hz
     error : float, expected relative error
     seconds, memory : float, predicted cost of the first response in s and bytes

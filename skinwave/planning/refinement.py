@@ -54,11 +54,11 @@ class SizeController:
         return self.margin * change / abs(ratio**self.order - 1)
 
     def size(self, h: float, error: float, tolerance: float) -> float:
-        """Return the element size in metre that meets a tolerance, from the error with h."""
+        """Return the element size in m that meets a tolerance, from the error with h."""
         return h * (self.safety * tolerance / error) ** (1 / self.order)
 
     def nearest(self, sizes: Floats, h: float, error: float, tolerance: float) -> float:
-        """Return the next of a sequence of sizes in metre after h."""
+        """Return the next of a sequence of sizes in m after h."""
         wanted = max(self.size(h, error, tolerance), h / self.largest_factor)
         return float(sizes[np.abs(np.log(sizes / wanted)).argmin()])
 
@@ -68,8 +68,8 @@ CONTROLLER = SizeController()
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refined:
-    """Refined mesh: its element size `h` in metre, the expected relative `error` as of
-    `mesh_error`, the size in metre that it was `compared` with, and its reduced body.
+    """Refined mesh: its element size `h` in m, the expected relative `error` as of `mesh_error`,
+    the size in m that it was `compared` with, and its reduced body.
     """
 
     h: float
@@ -112,7 +112,7 @@ def refine(
 
 
 def element_sizes(body: Body) -> Floats:
-    """Return the sequence of element sizes (k,) in metre for a body, descending."""
+    """Return the sequence of element sizes (k,) in m for a body, descending."""
     coarsest, finest = FIRST * default_size(body), FINEST * default_size(body)
     if not body.of_kind.conforming:  # coarser meshes would cut off the rim and layers
         coarsest = min(FIRST_HAND * default_size(body), COMPARED * coarsest_size(body))
@@ -158,13 +158,13 @@ def _has_cell_layers(body: Body) -> bool:
 
 
 def _layered_size(body: Body, layers: int, near: float) -> float:
-    """Return the size in metre near another for about so many layers of cells in a slab."""
+    """Return the size in m near another for about so many layers of cells in a slab."""
     sizes = (near * 2 ** np.linspace(-1, 1, 101)).tolist()
     return min(sizes, key=lambda h: (abs(cell_layers(body, h) - layers), abs(np.log(h / near))))
 
 
 def refinement_ratio(body: Body, other: float, h: float) -> float:
-    """Return the refinement ratio of two meshes: that of their sizes in metre, or of their cells on
+    """Return the refinement ratio of two meshes: that of their sizes in m, or of their cells on
     average of all axes where these differ less, because short sides have few cells.
     """
     if actual := body.of_kind.actual_size:
@@ -209,8 +209,8 @@ def above_band(waveforms: Floats, step: float) -> float:
 def mesh_error(
     body: Body, sizes: tuple[float, float], quantities: tuple[Array, Array], *, same: bool
 ) -> float:
-    """Return the error of the second of two element sizes in metre, from their quantities of
-    interest (k, p). If both give the `same` mesh, it is 1, or nan for the one mesh of a file.
+    """Return the error of the second of two element sizes in m, from their quantities of interest
+    (k, p). If both give the `same` mesh, it is 1, or nan for the one mesh of a file.
     """
     if same:
         return np.nan if body.file else 1.0
@@ -218,6 +218,6 @@ def mesh_error(
 
 
 def enough(body: Body, h: float, error: float, tolerance: float) -> float:
-    """Return the element size in metre that meets a tolerance, from the error with h."""
+    """Return the element size in m that meets a tolerance, from the error with h."""
     size = min(h, body.depth if body.of_kind.is_layer else h)
     return CONTROLLER.size(size, max(CONTROLLER.safety * tolerance, error), tolerance)

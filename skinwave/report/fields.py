@@ -44,7 +44,7 @@ class Field:
     ----------
     mesh : TetMesh
     times : (t,) float, s
-    displacement : (t, n, 3) float, metre, of the nodes of `mesh`
+    displacement : (t, n, 3) float, m, of the nodes of `mesh`
     effort : Effort
     expected_error : float, relative error of the waveforms at the probes, nan if unknown
 
@@ -94,7 +94,7 @@ class Field:
         return int(np.argmin(np.abs(times - time)))
 
     def to_pyvista(self, time: float | None = None) -> pv.UnstructuredGrid:
-        """Return the mesh at rest in metre with its `displacement` (n, 3) in metre.
+        """Return the mesh at rest in m with its `displacement` (n, 3) in m.
 
         It is that at the nearest time or, without a time in s, when it is largest. The field data
         `time_s` is the time.

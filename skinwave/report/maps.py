@@ -40,7 +40,7 @@ MEASURED_CAPTION = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredPlaces:
-    """Measured places (p, 2) in metre, and the RMS displacement (p,) in metre there."""
+    """Measured places (p, 2) in m, and the RMS displacement (p,) in m there."""
 
     places: Floats
     rms: Floats

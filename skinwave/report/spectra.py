@@ -255,7 +255,7 @@ def lines_figure(
     Parameters
     ----------
     lines : frequencies in Hz by name
-    places : (p, 2) float, metre
+    places : (p, 2) float, m
     measured : (f, p) complex, SI units
     error : (f, p) float, standard errors of amplitudes, SI units; nan if unknown
     models : (f, p) complex by `Run.column`, with gain and delay, SI units

@@ -56,7 +56,7 @@ def motion_lines(frames: Any, period: float) -> tuple[Floats, Complex]:
 
 
 def focus_places(pressure: MovingPressure, times: Floats) -> tuple[Floats, Floats]:
-    """Return the paths (m, q, 2) and the foci (t, k, 2) at times (t,), in metre."""
+    """Return the paths (m, q, 2) and the foci (t, k, 2) at times (t,), in m."""
     tacton, path = pressure.tacton, pressure.tacton.trajectory
     n = tacton.n_paths
     # No line connects the end of a path to the beginning of the next.

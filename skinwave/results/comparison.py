@@ -34,10 +34,10 @@ class Agreement:
     phase_delay : (f, p) float, s, by which each line is later in the candidate. At the probe where
         the line is strongest it lies between -1/4 and 3/4 of a period; it is unwrapped outwards
         from there, and nan where either line is 20 dB below its largest
-    spread_reference, spread_candidate : {-6: metre, -20: metre}, distance from the strongest probe
-        to the outermost one whose RMS motion is within 6 or 20 dB
+    spread_reference, spread_candidate : {-6: m, -20: m}, distance from the strongest probe to
+        the outermost one whose RMS motion is within 6 or 20 dB
     frequencies : (f,) float, Hz
-    probes : (p, 2) float, metre
+    probes : (p, 2) float, m
 
     Examples
     --------
@@ -128,7 +128,7 @@ def phase_delays(
 ) -> Floats:
     """Return the delays (f, p) in s as `Agreement.phase_delay` defines them.
 
-    Complex amplitudes are (f, p), at frequencies (f,) in Hz and probes (p, 2) in metre.
+    Complex amplitudes are (f, p), at frequencies (f,) in Hz and probes (p, 2) in m.
     """
     delays = np.full(reference.shape, np.nan)
     for k, (a, b, f) in enumerate(zip(reference, candidate, frequencies, strict=True)):
@@ -198,7 +198,7 @@ def _moving(response: Response) -> Floats:
 
 
 def spread(response: Response) -> dict[int, float]:
-    """Return the distance in metre from the strongest probe to the outermost within 6 and 20 dB."""
+    """Return the distance in m from the strongest probe to the outermost within 6 and 20 dB."""
     level = moving_rms(response)
     strongest = int(np.argmax(level))
     distance = np.linalg.norm(response.probes - response.probes[strongest], axis=1)

@@ -174,7 +174,7 @@ def check_values(frames: int, nodes: int) -> None:
 
 
 def vibration(moved: BodyMotion, times: Floats) -> Floats:
-    """Return the steady displacement (t, m, 3) in metre of the nodes of `mesh` about its mean."""
+    """Return the steady displacement (t, m, 3) in m of the nodes of `mesh` about its mean."""
     check_values(len(times), len(moved.mesh.points))
     z = _coordinates(oscillating(moved.motion), times)
     return (z @ moved.own_basis.T).reshape(len(times), -1, 3)

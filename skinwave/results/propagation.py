@@ -43,7 +43,7 @@ class Component:
 
 @dataclass(frozen=True, kw_only=True)
 class Reach:
-    """A distance in metre from the path; `beyond` if the map ends there."""
+    """A distance in m from the path; `beyond` if the map ends there."""
 
     metre: float
     beyond: bool = False
@@ -118,14 +118,14 @@ def share_outside(kernel: Floats, rms: Floats) -> float:
 
 
 def reach_of(inside: np.ndarray, distance: Floats) -> Reach:
-    """Return the largest distance (ny, nx) in metre of the places (ny, nx) that are `inside`."""
+    """Return the largest distance (ny, nx) in m of the places (ny, nx) that are `inside`."""
     edge = np.ones_like(inside)
     edge[1:-1, 1:-1] = False
     return Reach(metre=float(distance[inside].max()), beyond=bool((inside & edge).any()))
 
 
 def distance_from_path(scene: Scene, places: Floats) -> Floats:
-    """Return the distance (...) in metre of places (..., 2) from the path of the focus."""
+    """Return the distance (...) in m of places (..., 2) from the path of the focus."""
     return np.asarray(cKDTree(path_points(scene, 1441)).query(places)[0])
 
 

@@ -90,7 +90,7 @@ class Run(OfTacton):
 
     @property
     def places(self) -> Floats:
-        """Places (p, 2) of the probes in metre."""
+        """Places (p, 2) of the probes in m."""
         return self.response.probes
 
     @property

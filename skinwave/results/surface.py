@@ -54,7 +54,7 @@ MOST_AT_ONCE = 2_000_000  # values in time that are held in memory
 MOST_PLACES = 40_000
 
 Lines = tuple[Floats, fem.Complex]  # frequencies (f,) in Hz, complex amplitudes (f, p)
-LinesAt = Callable[[Floats], Lines]  # places (p, 2) in metre -> their lines
+LinesAt = Callable[[Floats], Lines]  # places (p, 2) in m -> their lines
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,12 +63,12 @@ class SurfaceField:
 
     Parameters
     ----------
-    x, y : (nx,), (ny,) float, metre, equally spaced
+    x, y : (nx,), (ny,) float, m, equally spaced
     rms : (ny, nx) float, SI unit of the quantity; nan off the body
     quantity : Quantity; the pressure for the point kernel
     level : (ny, nx) float, dB, highest sensation level of a component; nan off the body; None
         unless the map is of the displacement of skin
-    depth : float, metre, below the surface
+    depth : float, m, below the surface
     note : str, how it was computed
     error : float, expected error relative to the largest RMS, or nan
     """
@@ -84,7 +84,7 @@ class SurfaceField:
 
     @property
     def places(self) -> Floats:
-        """Places (ny, nx, 2) in metre."""
+        """Places (ny, nx, 2) in m."""
         return np.stack(np.meshgrid(self.x, self.y), axis=-1)
 
     @property
@@ -94,7 +94,7 @@ class SurfaceField:
 
 
 def grid(scene: Scene, reach: float = REACH, step: float = STEP) -> tuple[Floats, Floats]:
-    """Return coordinates (nx,) and (ny,) in metre of a map about the origin, within the body."""
+    """Return coordinates (nx,) and (ny,) in m of a map about the origin, within the body."""
     body = scene.body
     sides = (body.width, body.height) if body.of_kind.is_bounded else (np.inf, np.inf)
     counts = [int(min(reach, side / 2) / step * (1 + 1e-9)) for side in sides]
@@ -118,15 +118,14 @@ def surface_lines(scene: Scene) -> LinesAt:
 
 
 def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceField:
-    """Return the map of the point kernel's pressure at x (nx,) and y (ny,) in metre."""
+    """Return the map of the point kernel's pressure at x (nx,) and y (ny,) in m."""
     lines_at = partial(pressure_lines, pressure, threshold=NEGLIGIBLE_LINE_RATIO)
     rms = _rms(PRESSURE, _interpolate(pressure, lines_at, x, y), len(x) * len(y))
     return SurfaceField(x=x, y=y, rms=rms.reshape(len(y), len(x)), quantity=PRESSURE)
 
 
 def body_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions = DEFAULT) -> SurfaceField:
-    """Return the map of a body's displacement at x (nx,) and y (ny,) in metre, with sensation
-    levels.
+    """Return the map of a body's displacement at x (nx,) and y (ny,) in m, with sensation levels.
 
     Elements are larger than those of `simulate`, or as large as the options say if that is larger.
     A sheet is linear if the model of the options is.
@@ -163,7 +162,7 @@ def quantity_map(
     ----------
     scene : Scene
     options : SolveOptions
-    reach, step : float, metre, half side of the map (at most to the edges), and spacing of places
+    reach, step : float, m, half side of the map (at most to the edges), and spacing of places
 
     Raises
     ------

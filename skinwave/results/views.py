@@ -62,10 +62,10 @@ class View:
     ----------
     body : name of the body; model, scene
     quantity : displacement, or the pressure of the point kernel
-    points : (n, 3) float, metre; tets : (m, 10) int, empty for a surface without elements
+    points : (n, 3) float, m; tets : (m, 10) int, empty for a surface without elements
     surface : (s,) int, points of the upper surface; triangles : (k, 3) int, indices into `surface`
     times : (f,) float, s, through the `period` that is played
-    motion : (f, n, 3) float32, metre; pressure in Pa along z for the point kernel
+    motion : (f, n, 3) float32, m; pressure in Pa along z for the point kernel
     tone : Hz, line that moves the surface most; speed : m/s, of a surface wave there, or None
     tensors : strain and stress at some of the times, of a solid body read from a file
     shade : quantity that colours the surface instead of its motion
@@ -96,7 +96,7 @@ class View:
 
     @property
     def places(self) -> Floats:
-        """Places (s, 2) of the upper surface in metre."""
+        """Places (s, 2) of the upper surface in m."""
         return self.points[self.surface, :2]
 
     @property
@@ -114,7 +114,7 @@ class View:
 
     @cached_property
     def finder(self) -> Any:
-        """Function of x and y (...) in metre that returns the index in `upward`, or -1."""
+        """Function of x and y (...) in m that returns the index in `upward`, or -1."""
         from matplotlib.tri import Triangulation
 
         x, y = self.places.T
@@ -175,7 +175,7 @@ def field_frames(count: int) -> Ints:
 
 
 def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int]) -> View:
-    """Return the point kernel's view on a flat rectangle of half sides `reach` (2,) in metre."""
+    """Return the point kernel's view on a flat rectangle of half sides `reach` (2,) in m."""
     pressure = scene.pressure
 
     def motion_at(places: Floats, t: Floats) -> Floats:
@@ -260,7 +260,7 @@ def _flat_view(
 
 
 def path_points(scene: Scene, count: int = 241) -> Floats:
-    """Return the closed path (count, 2) in metre, or one point if the focus rests."""
+    """Return the closed path (count, 2) in m, or one point if the focus rests."""
     path = scene.tacton.trajectory
     return path.at_phase(np.zeros(1) if path.is_static else np.linspace(0, 1, count))
 

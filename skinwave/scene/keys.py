@@ -20,7 +20,7 @@ from skinwave.scene.material_file import material_of, modulus_columns, values_of
 from skinwave.scene.scene import Layer, Mounting, Phalanx, Relief, Sides, solid_of
 from skinwave.system.plain_text import number_in
 
-# Typical depths in metre of receptors in the glabrous skin of a hand: Merkel cells at the base of
+# Typical depths in m of receptors in the glabrous skin of a hand: Merkel cells at the base of
 # the epidermis, Meissner corpuscles in the papillae next to them, Pacinian corpuscles in the deep
 # dermis and below. They differ by half between places and people.
 RECEPTORS = {"surface": 0.0, "meissner": 0.7e-3, "merkel": 0.75e-3, "pacini": 2e-3}
@@ -262,7 +262,7 @@ def _one_depth(key: str, value: Any) -> float:
 
 
 def depth_of(word: str) -> float:
-    """Return the depth in metre of a word on the command line: a number in mm, or a receptor."""
+    """Return the depth in m of a word on the command line: a number in mm, or a receptor."""
     number = number_in(word)
     return _one_depth("--depth", word if number is None else number)
 

@@ -36,7 +36,7 @@ class SupportMotion:
 
     Parameters
     ----------
-    amplitude : float, metre, at most 0.01
+    amplitude : float, m, at most 0.01
     frequency : float, Hz, at most 1000
     direction : (x, y, z) of any length, z upwards
     """
@@ -58,7 +58,7 @@ class SupportMotion:
 
     @property
     def line(self) -> complex:
-        """Amplitude a in metre of the motion Re a exp(2 pi i f t)."""
+        """Amplitude a in m of the motion Re a exp(2 pi i f t)."""
         return -1j * self.amplitude
 
     @property
@@ -90,7 +90,7 @@ class Load:
     direction : of a shear traction (x, y) of any length, or "path", along the path of the focus; of
         a force (x, y, z), z upwards; () for the default of the kind
     force : float, N, of a contact at full drive
-    width : float, metre, standard deviation of the Gaussian traction of a contact; 0 for 2 mm
+    width : float, m, standard deviation of the Gaussian traction of a contact; 0 for 2 mm
     gravity : float, m/s2, downwards; it deflects the body before the load begins
     support_motion : SupportMotion of everything that holds the body, or None
 

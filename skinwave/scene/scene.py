@@ -46,7 +46,7 @@ PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Name of the quantity that probes read, and the depth in metre of each; () at the surface."""
+    """Name of the quantity that probes read, and the depth in m of each; () at the surface."""
 
     quantity: str = DISPLACEMENT.name
     depths: tuple[float, ...] = ()
@@ -87,8 +87,8 @@ class Scene:
     name : str
     pressure : MovingPressure with its Tacton; for a load without a device, that of the load
     body : Body
-    probes : (p, 2) positions in metre on the surface
-    depth : of the probes in metre below the surface, along its normal; one for all, or one each
+    probes : (p, 2) positions in m on the surface
+    depth : of the probes in m below the surface, along its normal; one for all, or one each
     load : kind of load, and gravity
     quantity : what the probes read, one of `simple_model.quantities.QUANTITIES`
     spreads : dotted key of a scene file and distribution of its number about the value of the
@@ -191,12 +191,12 @@ class Scene:
 
     @property
     def probe_points(self) -> Floats:
-        """Probes as an array (p, 2) in metre."""
+        """Probes as an array (p, 2) in m."""
         return np.array(self.probes)
 
     @property
     def depths(self) -> tuple[float, ...]:
-        """Depth in metre of each probe."""
+        """Depth in m of each probe."""
         one = not isinstance(self.depth, tuple)
         return (self.depth,) * len(self.probes) if one else self.depth  # type: ignore[return-value]
 

@@ -64,7 +64,7 @@ def paper_vs_skin(
     bodies: Mapping[str, Body] | None = None,
 ) -> Findings:
     """Run Tactons (default: the paper's 15) through the mechanisms on bodies (default: paper sheet
-    and skin slab), with solid elements of size h in metre.
+    and skin slab), with solid elements of size h in m.
     """
     bodies = bodies or {name: BODIES[name] for name in MEASURED_ON}
     chosen = [(n, replace(t, duration=DURATION)) for n, t in (patterns or tactons())]

@@ -99,8 +99,8 @@ class HierarchyStep:
 @dataclass(frozen=True, kw_only=True)
 class Effect:
     """Effect of dropping one assumption: largest change of a waveform relative to the strongest
-    probe, its probe (x, y) in metre, increase of the sensation level and of lines in dB, change of
-    the waveform if this is the only assumption, and additional seconds.
+    probe, its probe (x, y) in m, increase of the sensation level and of lines in dB, change of the
+    waveform if this is the only assumption, and additional seconds.
     """
 
     name: str
@@ -166,7 +166,7 @@ def hierarchy_of(
 ) -> Hierarchy:
     """Compute a scene at every step of the model hierarchy.
 
-    Elements have the size h in metre, by default `LARGER` times that of the body. `update_rate` and
+    Elements have the size h in m, by default `LARGER` times that of the body. `update_rate` and
     `points` are those of `device_path`. Raises a ValueError if the scene has no body, its probes do
     not read the displacement of the surface, or no such device exists.
     """

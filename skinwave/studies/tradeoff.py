@@ -47,7 +47,7 @@ CAPTION = (
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """Model and its discretisation: element size in metre, tolerance of its reduction or time
+    """Model and its discretisation: element size in m, tolerance of its reduction or time
     integration, and time step in s.
     """
 

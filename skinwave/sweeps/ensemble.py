@@ -300,7 +300,7 @@ def waveform_times(scene: Scene) -> Floats:
 
 
 def map_axes(scene: Scene) -> tuple[Floats, Floats]:
-    """Return the coordinates (nx,) and (ny,) in metre of the map."""
+    """Return the coordinates (nx,) and (ny,) in m of the map."""
     return grid(scene, REACH, STEP)
 
 

@@ -42,8 +42,8 @@ Distribute = Callable[[Callable[[Any], Any], Sequence[Any], Callable[[int, Any],
 
 @dataclass(frozen=True, kw_only=True)
 class Mesh:
-    """Element sizes in metre of the two meshes of a reduction: `h` of its runs, and `coarser` for
-    their error; or the `error` of making them.
+    """Element sizes in m of the two meshes of a reduction: `h` of its runs, and `coarser` for their
+    error; or the `error` of making them.
 
     For a body of a `family`, also the body that is `meshed`, and the `values` of its free keys.
     """
@@ -207,7 +207,7 @@ def _reduce_twice(solid: Solid, options: SolveOptions, mesh: Mesh) -> list[Reduc
 def prepare_body(
     solid: Solid, h: float, tolerance: float, solver: str, family: Covering | None, values: Values
 ) -> ReducedBody:
-    """Return a reduced body with elements of h in metre; in a family, the one with these values."""
+    """Return a reduced body with elements of h in m; in a family, the one with these values."""
     if family:
         return parametric.at(cached_shared_body(family, h, tolerance, solver), dict(values))
     body, probes, reading, load = solid

@@ -8,7 +8,7 @@ from typing import SupportsFloat
 import numpy as np
 from numpy.typing import ArrayLike
 
-SCALES = {"um": 1e6, "mm": 1e3}  # of units in which values in metres are shown
+SCALES = {"um": 1e6, "mm": 1e3}  # of units in which values in m are shown
 
 
 @dataclass(frozen=True, kw_only=True)

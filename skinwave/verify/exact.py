@@ -187,7 +187,7 @@ def _line(
     mesh: TetMesh, quarter: Callable[[bool], fem.Operators], load: MovingPressure, hz: float,
     probes: Array,
 ) -> Array:  # fmt: skip
-    """Return the complex amplitude (p,) of one line in metres, from a quarter of the body.
+    """Return the complex amplitude (p,) of one line in m, from a quarter of the body.
 
     Harmonic n of the circling focal spot is f(r) exp(-i n angle). Probes on the x axis respond only
     to its cosine part, which is even in y, and even or odd in x like n.

@@ -29,7 +29,7 @@ from skinwave.verify.setups import (
 )
 
 SUPPORTED = {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}  # Navier's supports
-# Lengths in metres and material of two plates with known natural frequencies in 3-D.
+# Lengths in m and material of two plates with known natural frequencies in 3-D.
 STEEL = ((10.0, 10.0, 1.0), fem.from_young(density=8000, young=200e9, poisson=0.3))
 SOFT = ((0.06, 0.06, 0.01), fem.Material(density=1000, shear_modulus=25e3, poisson=0.45))
 # Thickness over width, half waves along the width, and length over thickness of an element.

@@ -169,7 +169,7 @@ def absorbing_layer() -> Checks:
 
 
 def _plane_slab(body: Body, hertz: Array, h: float = 2.5e-3) -> Array:
-    """Return displacements (f, p) in metres under a line focus, in the half x > 0 of a slab."""
+    """Return displacements (f, p) in m under a line focus, in the half x > 0 of a slab."""
     x, _, z = slab_lines(body, h)
     mesh = meshes.half(meshes.extrude(x, [0, h], z), "x")
     ops = fem.assemble(
