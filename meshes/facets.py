@@ -76,7 +76,9 @@ def visible_from_above(mesh: TetMesh) -> np.ndarray:
 
 
 def heights_over(triangles: Floats, places: Floats) -> Floats:
-    """Return the heights (m,) in m of triangles (m, 3, 3) above places (m, 2) or (2,), else -inf."""
+    """Return the heights (m,) of triangles (m, 3, 3) above places (m, 2) or (2,), in m; else
+    -inf.
+    """
     flat = triangles[..., :2] - places[..., None, :]
     x, y = flat[..., 0], flat[..., 1]
     share = np.stack(

@@ -30,7 +30,9 @@ def rotation_to_z(up: str) -> Floats:
 
 
 def align(surface: Surface) -> tuple[Surface, Floats]:
-    """Return the surface with its top above the widest circle at the origin, and its shift (3,), m."""
+    """Move a surface so that its top above the widest circle is the origin; also return the shift
+    (3,) in m.
+    """
     x, y, _ = widest_circle(surface)
     shift = -np.array([x, y, height_at(surface, x, y)])
     return Surface(points=surface.points + shift, triangles=surface.triangles), shift

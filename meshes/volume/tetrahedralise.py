@@ -112,7 +112,7 @@ def graded(h: float, grading: Grading) -> Sizing:
 
 
 def _envelope(surface: Surface, h: float) -> float:
-    """Largest distance in m of a mesh from a surface. Smaller ones are slower on curved surfaces."""
+    """Largest distance in m of a mesh from a surface; smaller ones take longer if it is curved."""
     thickness, diagonal = thinnest(surface), surface.diagonal
     most, least = MOST_OF_THICKNESS * thickness, SMALLEST_EPSILON * diagonal
     if most < least:

@@ -155,7 +155,7 @@ class MovingPressure:
         return full / len(self.tacton.foci) * relative
 
     def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:
-        """Relative focal spot (..., n) at points (n, 2 or 3), for a focus at centres (..., 2), m."""
+        """Relative focal spot (..., n) at points (n, 2 or 3) for a focus at centres (..., 2), m."""
         points, centre = np.asarray(points, np.float64), np.asarray(centre, np.float64)
         spot = spot_of_foci(points[:, :2], centre, self.height, self.profile)
         contact = isinstance(self.profile, ContactSpot)

@@ -87,7 +87,7 @@ def _shear_stiffness(body: Body, mesh: TetMesh) -> float:
 
 
 def depths(mesh: TetMesh) -> Floats:
-    """Return the depth (m,) in m of the middle of each tetrahedron below the top, along the beam."""
+    """Return the depth (m,) in m of each tetrahedron's middle below the top, along the beam."""
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
     top = mesh.points[np.unique(mesh.facets["top"])]
