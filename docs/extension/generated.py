@@ -253,6 +253,13 @@ def drives() -> str:
     return table(["drive law", "", "lines of AM"], rows)
 
 
+def claims() -> str:
+    """Return the claims of the paper about spectral lines."""
+    from skinwave.results.claims import TEXTS
+
+    return table(["claim", ""], TEXTS.items())
+
+
 # Verification
 
 
@@ -321,6 +328,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "materials": materials,
     "quantities": quantities,
     "drives": drives,
+    "claims": claims,
     "verification": verification,
     "changelog": lambda: _page("CHANGELOG.md", "docs"),
     "contributing": lambda: _page("CONTRIBUTING.md", "docs"),

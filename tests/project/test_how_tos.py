@@ -25,7 +25,6 @@ WRITTEN = {
     "silicone-disc": ("disc/responses.npz", "disc.gif", "disc.pvd", "waves/index.html"),
     "fingertip": (),
     "bands": ("skin/percentiles.csv", "skin/samples.csv"),
-    "in-a-notebook": ("waves.csv", "waves.pdf"),
     "own-laws": (),
     "supplement": ("supplement/record.json", "again/record.json"),
 }
