@@ -4,7 +4,7 @@
 
 (`maxwell` describes what Prony terms and other modulus laws add to K.)
 
-Operators are assembled and factorised once. Index letters of all einsum in this package:
+Operators are assembled and factorised once. Index letters of einsum in this package:
 
     e    element or facet
     q    quadrature point

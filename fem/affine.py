@@ -95,9 +95,9 @@ def assemble_affine(
     support: Support | None = None,
     coat: Coat | None = None,
 ) -> AffineOperators:
-    """Return the operators of a body for all materials with the Poisson's ratios of those given
-    (r,): first of the layers of its coat, then of the regions 0, 1, ... Other arguments are those
-    of `assemble`.
+    """Return the operators of a body for all materials with the same Poisson's ratios as the given
+    ones (r,): those of the layers of its coat, then of the regions 0, 1, ... See `assemble` for the
+    other arguments.
     """
     dashpots_only = support and replace(support, stiffness=np.zeros_like(support.stiffness))
     alone = [_only(materials, r) for r in range(len(materials))]
@@ -126,8 +126,8 @@ def assemble_affine(
 
 
 def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
-    """Return the operators of materials without own modulus laws. With a fluid, `affine` must be
-    projected. Dashpots have the impedances of the moduli at rest.
+    """Return the operators for materials without modulus laws. With a fluid, `affine` must be
+    projected. The impedances of dashpots are those of the moduli at rest.
     """
     materials = [m.without_loss_factor() for m in solids.materials]
     lags, times, shares = relaxation_of(materials)
@@ -180,7 +180,9 @@ def weights(terms: Terms, solids: Solids, frequencies: ArrayLike) -> Complex:
 
 
 def project(affine: AffineOperators, basis: Floats, before: Floats) -> Floats:
-    """Project the matrices onto a basis (n_free, m); `before` (q, k, k) has those of k vectors."""
+    """Project the matrices onto a basis (n_free, m); `before` (q, k, k) are the known projections
+    onto its first k vectors.
+    """
     k, m = before.shape[1], basis.shape[1]
     projected = np.empty((len(affine.parts), m, m))
     projected[:, :k, :k] = before
@@ -240,7 +242,7 @@ def _solve_with_fluid(
 
 
 def _only(materials: Sequence[Material], r: int) -> tuple[Material, ...]:
-    """Return elastic materials with modulus and density 1 for material r, negligible for others."""
+    """Return elastic materials: modulus and density are 1 for material r, negligible for others."""
     size = [1.0 if k == r else NEGLIGIBLE for k in range(len(materials))]
     return tuple(
         Material(density=x, shear_modulus=x, poisson=m.poisson)

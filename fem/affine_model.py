@@ -52,20 +52,20 @@ def steady_states(
 def steady_outputs(
     model: AffineModel, weights: Complex, shares: Floats, lines: Iterable[int], size: int = 0
 ) -> Complex:
-    """Return the steady outputs (k, p) in m; for the arguments see `steady_states`."""
+    """Return the steady outputs (k, p) in m; see `steady_states` for the arguments."""
     states = steady_states(model, weights, shares, lines, size)
     outputs = np.tensordot(shares, model.outputs[..., : states.shape[1]], 1)
     return np.asarray(states @ outputs.T, np.complex128)
 
 
 def steady_lines(bases: Sequence[AffineModel], weights: Complex, shares: Floats) -> Complex:
-    """Return the steady outputs (f, p) by a model of one line for each of the weights (f, q)."""
+    """Return the steady outputs (f, p) for weights (f, q), with one model for each line."""
     each = zip(bases, weights, strict=True)
     return np.concatenate([steady_outputs(model, w[None], shares, [0]) for model, w in each])
 
 
 def operators_at(model: AffineModel, solids: Solids, shares: Floats) -> Operators:
-    """Return the operators in the coordinates of a model, of materials without own modulus laws."""
+    """Return the operators in the coordinates of a model, for materials without modulus laws."""
     return operators_of(interpolate(model, shares), solids)
 
 

@@ -70,8 +70,8 @@ def dashpots(
 ) -> sparse.csr_array:
     """Return the Lysmer-Kuhlemeyer damping (3 n, 3 n) in N s/m of absorbing facets (e, a).
 
-    `region` has the index of each element's material, `share` (e q,) the fraction of the damping at
-    each quadrature point.
+    `region` has the index of each element's material, and `share` (e q,) the fraction of the
+    damping at each quadrature point.
     """
     if share is not None:
         nodes, share = _nonzero_facets(nodes, share)

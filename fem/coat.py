@@ -154,7 +154,7 @@ def _frames(points: Floats, slopes: Floats) -> tuple[Floats, Floats]:
 
 
 def _edges(facets: Ints, points: Floats, fixed: Bools) -> Edges:
-    """Return the edges, except the free border, of facets (e, a) with nodes at points (e, a, i)."""
+    """Return the edges of facets (e, a) with nodes at points (e, a, i), without the free border."""
     ends = facets[:, TRIANGLE_EDGES].reshape(-1, 2)
     _, edge, sides = np.unique(
         np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True

@@ -145,7 +145,7 @@ def with_energy_balance(
 
 
 def mechanical_energy(body: Elastic | Operators, state: State) -> float:
-    """Return the elastic and kinetic energy of a state in J."""
+    """Return the elastic and kinetic energy in J of a state; the body may be linear `Operators`."""
     body = body if isinstance(body, Elastic) else Elastic.linear(body)
     ops = body.operators
     u, v = state.displacement[ops.free], state.velocity[ops.free]
@@ -155,9 +155,10 @@ def mechanical_energy(body: Elastic | Operators, state: State) -> float:
 
 
 def imbalance(spent: EnergyBalance, stored: float = 0.0) -> float:
-    """Return the relative error of an energy balance with the energy `stored` in J since its start.
+    """Return the error of an energy balance relative to its largest part.
 
-    Round-off of the reactive power, or of tiny numbers, is not counted.
+    `stored` is the energy in J that the body has gained. Round-off is ignored: of the reactive
+    power, and of tiny numbers.
     """
     size = max(abs(spent.work), abs(stored) + spent.lost, ROUND_OFF * spent.exchanged)
     return abs(spent.work - stored - spent.lost) / size if size > TINY else 0.0

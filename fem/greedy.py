@@ -2,12 +2,12 @@
 
 Rozza, Huynh and Patera, Arch Comput Methods Eng 15:229 (2008).
 
-`reduce_affine`: one basis of Krylov moments serves all materials and geometries if it holds those
-of the least loss, whose motion has most detail. The search begins with the reduced-order model of
-that material (`krylov`). Over a training set, the change of the response by the last quarter of the
-basis selects materials and lines, which are solved on the full body. If the error exceeds the
-tolerance, the moments of that material are added. Geometries share one mesh, whose nodes move;
-variants between the geometries are solved on the full body each time.
+`reduce_affine`: one basis of Krylov moments serves all materials and geometries if it includes the
+moments of the material with the lowest loss, whose motion has the most detail. The search begins
+with the reduced-order model of that material (`krylov`). Over a training set, the change of the
+response by the last quarter of the basis selects materials and lines, which are solved on the full
+body. If the error exceeds the tolerance, the moments of that material are added. Geometries share
+one mesh, whose nodes move; variants between the geometries are solved on the full body each time.
 
 `line_bases`: the states of such a model at one line form a smooth manifold, which a few states
 span. The next state is that of the material whose response the last state changed most. The search
@@ -65,9 +65,7 @@ class Geometry:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Variant:
-    """One body of a range: its `solids`, the full body of its `geometry`, and the `shares` (g,) of
-    the geometries that it is interpolated between.
-    """
+    """One body of a range: `solids`, `geometry`, and the `shares` (g,) of the geometries."""
 
     solids: Solids
     geometry: Callable[[], Geometry]
@@ -75,7 +73,7 @@ class Variant:
 
     @property
     def is_between(self) -> bool:
-        """Whether its geometry lies between those that others are interpolated between."""
+        """Whether its geometry is interpolated, not one of the g geometries."""
         return float(self.shares.max()) < 1 - SHARE_TOLERANCE
 
 
@@ -92,9 +90,9 @@ def reduce_affine(
     """Return a model for all variants of a range, the largest relative error at a line of the full
     body, and the number of factorisations.
 
-    Others are interpolated between the geometries (g,); the training set has no own modulus laws.
-    Errors are checked at lines with frequencies (f,) in Hz. `band` and `solver` are those of
-    `reduce`. Raises a ValueError if `MOST_BASES` variants are not enough.
+    Other variants are interpolated between the geometries (g,). Materials of the training set have
+    no modulus laws. Errors are checked at lines with frequencies (f,) in Hz. `band` and `solver`
+    are those of `reduce`. Raises a ValueError if `MOST_BASES` variants are not enough.
     """
     t = min(range(len(training)), key=lambda each: _loss(training[each].solids))
     first = training[t].geometry()
@@ -159,8 +157,8 @@ def _suspects(
     smaller: int,
 ) -> Iterator[tuple[int, int, Complex, float]]:
     """Yield variants to check: those that the last vectors changed most, all between the
-    geometries, and one of each geometry. Each has the line that changed most, the response (p,)
-    there, and the least scale of its error.
+    geometries, and one of each geometry. Each comes with the line that changed most, the response
+    (p,) there, and the smallest scale of its error.
     """
     if not others:
         return

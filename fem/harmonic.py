@@ -40,7 +40,8 @@ class LineSolver:
 
     def __call__(self, frequency: float, force: Any) -> Complex:
         """Return the complex displacement (3 n,) or (3 n, k) in m at a frequency in Hz under forces
-        of the same shape in N. Raises a ValueError for an unconstrained body at 0 Hz.
+        of the same shape in N. Raises a ValueError if the body is unconstrained and the frequency
+        is 0 Hz.
         """
         s = 2j * np.pi * frequency
         factors = s, *(branch.share(s) for branch in self._operators.branches)

@@ -197,7 +197,7 @@ class KrylovBasis:
         return K, C, M, tuple(MaxwellBranch(K=A, time=b.time) for A, b in branches)
 
     def rows(self, size: int) -> Floats:
-        """Return the components (size, k) of the vectors last given to `project`."""
+        """Return the components (size, k) of the vectors that `project` received last."""
         return self._rows[:size]
 
     def radiation(self, R: sparse.csr_array, size: int) -> Floats:

@@ -55,6 +55,14 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
         If the backend is unknown or not installed, or A is singular.
     MemoryError
         If the factor fits neither in memory nor on the disk.
+
+    Examples
+    --------
+    >>> import fem, numpy as np
+    >>> from scipy import sparse
+    >>> A = sparse.csr_array([[2.0, 1.0], [1.0, 2.0]])
+    >>> fem.factorise(A).solve(np.array([3.0, 3.0])).round(9)
+    array([1., 1.])
     """
     names = available()
     backend = names[0] if backend == "auto" else backend

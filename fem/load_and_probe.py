@@ -64,7 +64,13 @@ def _forces(mesh: TetMesh, facets: str | Ints, values: Floats) -> sparse.csr_arr
 
 
 def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
-    """Return the quadrature points (k q, 3) of `load_operator`, in m."""
+    """Return the quadrature points (k q, 3) of `load_operator`, in m.
+
+    >>> import fem, meshes
+    >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
+    >>> len(mesh.facets["top"]), fem.facet_points(mesh).shape
+    (32, (192, 3))
+    """
     nodes = facet_set(mesh, facets)
     N = shape_functions(triangle_rule()[0], nodes.shape[1])
     return np.einsum("qa,eai->eqi", N, mesh.points[nodes]).reshape(-1, 3)
@@ -100,6 +106,14 @@ def probe_operator(
     ------
     ValueError
         If a point lies off the facets or is not finite.
+
+    Examples
+    --------
+    >>> import fem, meshes, numpy as np
+    >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
+    >>> down = np.tile([0.0, 0.0, -1e-6], len(mesh.points))  # m, a translation
+    >>> fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.0]]) @ down
+    array([1.e-06, 1.e-06])
     """
     return _inwards(mesh, *_surface_frame(mesh, points, facets, patch))
 
@@ -203,7 +217,7 @@ def facet_areas(places: Floats) -> tuple[Floats, Floats]:
 
 def curved_coordinates(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
     """Return barycentric coordinates (p, 4) of points (p, 3) in curved tetrahedra with nodes
-    (p, a, 3), by Newton's method from initial ones.
+    (p, a, 3), by Newton's method from the given ones.
     """
     for _ in range(4):
         miss, tangents = _offsets(elements, barycentric, points)
@@ -244,7 +258,7 @@ def _facets_below(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
 
 
 def _candidates(facets: Floats, points: Floats) -> tuple[Ints, Ints]:
-    """Return pairs (m,) of points (p, 2) and facets (k, a, 2) whose bounding boxes hold them."""
+    """Return pairs (m,) of points (p, 2) and facets (k, a, 2) whose bounding boxes contain them."""
     hull = facets.copy()
     if facets.shape[1] == 6:  # the control points of the edges, which bound curved ones
         corners = facets[:, :3]
@@ -305,7 +319,7 @@ def straight_coordinates(corners: Floats, point: Floats) -> Floats:
 
 
 def locate(mesh: TetMesh, points: ArrayLike) -> tuple[Ints, Floats]:
-    """Return the element (p,) that each point (p, 3) in m lies in, and its barycentric coordinates
+    """Return the element (p,) around each point (p, 3) in m, and its barycentric coordinates
     (p, 4). Raises a ValueError if a point lies outside the body.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
@@ -322,7 +336,7 @@ def is_inside(mesh: TetMesh, points: ArrayLike) -> Bools:
 
 
 def _elements_at(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
-    """Return the element (p,) and coordinates (p, 4) of each point, and if it is inside."""
+    """Return the element (p,) and coordinates (p, 4) of each point, and whether it is inside."""
     corners = mesh.points[mesh.tets[:, :4]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     slack = BULGE * (high - low).max(axis=1, keepdims=True)

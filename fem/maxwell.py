@@ -71,7 +71,7 @@ Matrices = tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Bra
 
 
 def maxwell_only(branches: Sequence[Branch]) -> tuple[MaxwellBranch, ...]:
-    """Return the branches if each has an internal variable; else raise a ValueError."""
+    """Return the branches; raise a ValueError unless each has an internal variable."""
     maxwell = tuple(branch for branch in branches if isinstance(branch, MaxwellBranch))
     if len(maxwell) < len(branches):
         raise ValueError(NO_INTERNAL_VARIABLES)

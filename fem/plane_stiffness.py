@@ -35,7 +35,7 @@ class Tension:
 
 
 def directional_parts(materials: Sequence[Material]) -> dict[int, Floats]:
-    """Return the orthotropic part (3, 3) in Pa of plane stress stiffness, by material index."""
+    """Return the orthotropic part (3, 3) in Pa of the plane stress stiffness by material index."""
     return {
         m: solid.plane_stress - replace(solid, orthotropy=None).plane_stress
         for m, solid in enumerate(materials)

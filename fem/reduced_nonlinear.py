@@ -71,8 +71,8 @@ def stretching_modes(
     progress: Callable[[float], None] | None = None,
 ) -> StretchingModes:
     """Reduce a sheet, given by linear operators and its whole membrane, to its n lowest bending
-    modes, or with the added mass of a fluid to combinations of them. Raises Diverged if the modes
-    do not converge.
+    modes; with the added mass of a fluid, to combinations of them. Raises Diverged if the modes do
+    not converge.
     """
     hz, shapes = modes(operators, n, solver=solver)
     if added is not None:

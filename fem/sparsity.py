@@ -27,7 +27,7 @@ class SparsityPattern:
 
     @staticmethod
     def of(nodes: Ints, n: int) -> "SparsityPattern":
-        """Return the pattern of elements with nodes (e, a); node number n marks nodes left out.
+        """Return the pattern of elements with nodes (e, a); nodes with the number n are left out.
 
         Pairs of nodes are sorted by first and second node without comparisons, by transposing
         sparse matrices twice.

@@ -99,7 +99,7 @@ def _materials(
 
 def relaxation(material: Material, s: Any) -> Any:
     """Return the complex modulus of a material over its `shear_modulus`, at complex frequencies s
-    in rad/s. A branch with a pole at s, which moves nothing, counts as 0.
+    in rad/s. A branch with a pole at s is omitted: it moves nothing.
     """
     mu = material.shear_modulus
     if material.law is not None:
@@ -295,8 +295,8 @@ def nodal_strain(part: SolidPart, u: Floats, wanted: Ints | None = None) -> Floa
 
 
 def _nodes_by_corner(mesh: TetMesh, number: Ints) -> dict[int, tuple[Ints, Floats]]:
-    """Return, for each corner node, the wanted nodes that read its polynomial and its share in
-    each; `number` (n,) is negative for nodes that are not wanted.
+    """Return for each corner node the wanted nodes that use its polynomial, and its share in each;
+    `number` (n,) is negative for nodes that are not wanted.
     """
     middles, first = np.unique(mesh.tets[:, 4:], return_index=True)
     ends = mesh.tets[:, EDGES].reshape(-1, 2)[first]

@@ -27,7 +27,7 @@ class Diverged(ArithmeticError):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
-    """State at a time.
+    """State of a body at one time.
 
     Parameters
     ----------

@@ -55,9 +55,7 @@ def tag_boundary(
 
 
 def visible_from_above(mesh: TetMesh) -> np.ndarray:
-    """Return the mask (k,) of the `boundary_facets` that face upwards with nothing of the body
-    above.
-    """
+    """Return the mask (k,) of the `boundary_facets` that face upwards with nothing above them."""
     from scipy.spatial import cKDTree
 
     facets = boundary_facets(mesh.tets)
@@ -76,9 +74,7 @@ def visible_from_above(mesh: TetMesh) -> np.ndarray:
 
 
 def heights_over(triangles: Floats, places: Floats) -> Floats:
-    """Return the heights (m,) of triangles (m, 3, 3) above places (m, 2) or (2,), in m; else
-    -inf.
-    """
+    """Return the heights (m,) in m of triangles (m, 3, 3) above places (m, 2) or (2,), or -inf."""
     flat = triangles[..., :2] - places[..., None, :]
     x, y = flat[..., 0], flat[..., 1]
     share = np.stack(

@@ -63,7 +63,7 @@ def read_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
 
 
 def read_exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
-    """Return text as programs export it: in UTF-8, UTF-16, or the Latin-1 of Windows."""
+    """Return the text of an exported file, in UTF-8, UTF-16, or the Latin-1 of Windows."""
     raw = read_bytes(path, limit)
     encodings = ["utf-8-sig", "cp1252", "latin-1"]
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -82,7 +82,7 @@ def read_exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
 
 
 def load_arrays(path: PathLike) -> dict[str, Array]:
-    """Return the arrays of an .npz file by name, if it does not unpack to more than the limits."""
+    """Return the arrays of an .npz file by name; raise a ValueError if it unpacks to too much."""
     with open_regular(path) as file:
         try:
             limit = max(MOST_UNPACKED, MOST_GROWTH * os.fstat(file.fileno()).st_size)
@@ -102,7 +102,7 @@ def load_arrays(path: PathLike) -> dict[str, Array]:
 
 
 def load_json(path: PathLike) -> Any:
-    """Return the content of a JSON file, or raise a ValueError."""
+    """Return the content of a JSON file; raise a ValueError if it is not valid JSON."""
     try:
         return json.loads(read_text(path))
     except (ValueError, RecursionError) as error:

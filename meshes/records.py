@@ -11,8 +11,8 @@ PACKAGES = ("fem", "meshes", "simple_model", "skinwave")  # whose dataclasses ar
 
 
 def encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:
-    """Return a structure for JSON, and add the arrays in a value to `arrays`; raise a TypeError for
-    other values, such as functions.
+    """Return a value as a structure for JSON, and add its arrays to `arrays`; raise a TypeError for
+    values such as functions.
     """
     if isinstance(value, np.ndarray | np.generic):
         name = f"array_{len(arrays)}"
@@ -34,7 +34,7 @@ def encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:
 
 
 def decode(value: Any, arrays: Mapping[str, np.ndarray]) -> Any:
-    """Return the value of a structure of `encode`; raise a ValueError for unknown dataclasses."""
+    """Return the value that `encode` stored; raise a ValueError for unknown dataclasses."""
     if not isinstance(value, dict):
         return value
     if "array" in value:

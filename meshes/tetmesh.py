@@ -44,13 +44,13 @@ class TetMesh:
     ----------
     points : (n, 3) float, m
     tets : (m, 4) or (m, 10) int, node numbers in VTK order; inverted tetrahedra are reordered
-    region : (m,) int, number of the material of each tetrahedron; 0 by default
-    region_names : name of each region number that has one
+    region : (m,) int, region number of each tetrahedron; 0 by default
+    region_names : region number -> name
     facets : name -> (k, 3) or (k, 6) int, boundary facets as seen from outside
     unmoved : (n, 3) float, m, points before nodes were moved; their edges group the elements
 
-    Raises a MeshError if shapes or node numbers do not fit, a point is not finite or further away
-    than `FURTHEST`, or a tetrahedron is flat.
+    Raises a MeshError if shapes or node numbers do not fit, if a point is not finite or is further
+    away than `FURTHEST`, or if a tetrahedron is flat.
 
     >>> from meshes import block
     >>> mesh = block((0.04, 0.03, 0.01), 0.01)
@@ -153,7 +153,9 @@ def interface_facets(mesh: TetMesh) -> Ints:
 
 
 def facet_set(mesh: TetMesh, facets: str | Ints) -> Ints:
-    """Return the facets (k, 3 or 6) of a named set, or the given ones if they fit the mesh."""
+    """Return the facets (k, 3 or 6) of a set by its name, or the given ones; raise a MeshError if
+    the name is unknown or they do not fit.
+    """
     if not isinstance(facets, str):
         return _facets("given", facets, mesh.points, mesh.tets)
     if facets not in mesh.facets:
@@ -212,9 +214,7 @@ def half(mesh: TetMesh, axis: str) -> TetMesh:
 
 
 def part(mesh: TetMesh, inside: Bools) -> tuple[TetMesh, Ints]:
-    """Return the selected tetrahedra (m,) with their facets, and the original numbers (k,) of
-    nodes.
-    """
+    """Return the mesh of some tetrahedra, a mask (m,), and the original numbers (k,) of nodes."""
     nodes, tets = np.unique(mesh.tets[inside], return_inverse=True)
     tets = tets.reshape(-1, mesh.tets.shape[1])
     number = np.full(len(mesh.points), -1)
@@ -235,7 +235,7 @@ def part(mesh: TetMesh, inside: Bools) -> tuple[TetMesh, Ints]:
 
 
 def facet_keys(facets: Ints, n: int) -> Ints:
-    """Return one number (k,) per facet that depends on its corners, not on their order."""
+    """Return a number (k,) for each facet that does not depend on the order of its corners."""
     low, middle, high = np.sort(facets[:, :3], axis=1).T
     return (low * n + middle) * n + high
 

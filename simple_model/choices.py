@@ -9,9 +9,7 @@ SHORTEST_PART, LONGEST_WORD = 3, 60  # letters of a part that matches, and lette
 
 
 def choose(kind: str, value: str, known: Iterable[str]) -> str:
-    """Return the value if it is known; otherwise raise a ValueError with all known words and the
-    nearest.
-    """
+    """Return a known value; for others raise a ValueError with all known ones and the nearest."""
     known = list(known)
     if value in known:
         return value
@@ -21,8 +19,8 @@ def choose(kind: str, value: str, known: Iterable[str]) -> str:
 
 
 def suggestion(value: object, known: Iterable[str]) -> str:
-    """Suggest the nearest known word, to end a sentence; empty if none is near. The beginning of a
-    word, such as a key without its unit, is nearest to the word that adds fewest parts.
+    """Suggest the nearest known word as the end of a sentence, empty if none is near. A word
+    without its last parts, such as a key without its unit, suggests the shortest whole word.
     """
     words, given = {word.lower(): word for word in known}, str(value)[:LONGEST_WORD].lower()
     near = sorted(
@@ -35,9 +33,7 @@ def suggestion(value: object, known: Iterable[str]) -> str:
 
 
 def check_numbers(owner: str, record: object, *names: str, least: str = "above 0") -> None:
-    """Refuse fields of a record that are not finite and "above 0" or, as `least`, "0 or above".
-    None passes.
-    """
+    """Refuse fields, unless None, that are not finite and `least`: "above 0" or "0 or above"."""
     for name in names:
         value = getattr(record, name)
         if value is None or (

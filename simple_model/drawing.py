@@ -35,7 +35,7 @@ def new_axes(ax: "Axes | None") -> "Axes":
 
 
 def small() -> float:
-    """Font size in points of text that is smaller than that of axes."""
+    """Font size in points of text smaller than the labels of axes."""
     import matplotlib as mpl
 
     return max(SMALLER * float(mpl.rcParams["font.size"]), SMALLEST)
@@ -47,8 +47,8 @@ def place_name(place: Floats) -> str:
 
 
 def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) -> None:
-    """Draw values (k, p) along x (k,), a curve for each probe at places (p, 2) in m, from dark to
-    bright. The legend names at most `MOST_NAMED` curves.
+    """Draw values (k, p) over x (k,), one curve for each probe at places (p, 2) in m, from dark to
+    bright. The legend has at most `MOST_NAMED` entries.
     """
     import matplotlib as mpl
 
@@ -69,7 +69,7 @@ def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) 
 
 
 def picture(draw: Callable[["Figure"], object], width: float, height: float) -> bytes:
-    """Return the PNG file of a figure of a width and height in inch that a function draws."""
+    """Return the PNG file of a figure that a function draws; width and height in inches."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -93,7 +93,7 @@ def table(rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
 
 
 def page(title: str, image: bytes, tables: Iterable[str], warnings: Iterable[str] = ()) -> str:
-    """Format a record as a small HTML page: a figure in PNG, if any, HTML tables, and warnings."""
+    """Format a record as a small HTML page: a PNG figure, if any, HTML tables, and warnings."""
     data = b64encode(image).decode()
     figure = f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">' if image else ""
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in warnings)

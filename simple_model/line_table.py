@@ -78,8 +78,8 @@ def line_table(
 ) -> LineTable:
     """List the lines of a response to a load.
 
-    By name, it lists the lines of the load above -60 dB of the strongest one, weaker lines of the
-    load above -60 dB of the strongest line of the response, and the candidates.
+    Listed by name are lines of the load above -60 dB of its strongest, weaker ones above -60 dB of
+    the strongest line of the response, and the candidates.
 
     Parameters
     ----------
@@ -128,13 +128,13 @@ def resolved_lines(
     Parameters
     ----------
     pressure : MovingPressure, whose lines above -60 dB are used
-    response : Response, long enough to resolve a line or not
+    response : Response, whose duration decides which lines are resolved
     candidates : names of lines that are always listed
     highest : Hz; higher lines are left out
 
     Returns
     -------
-    frequencies in Hz by name, of the resolved lines and of the unresolved ones
+    frequencies in Hz by name: of the resolved lines, and of the unresolved ones
     """
     highest = min(highest, 0.5 / step(response.times))
     named = line_names(pressure, candidates=candidates)
@@ -150,7 +150,7 @@ def _name_lines(named: LineNames, chosen: Bools) -> dict[str, float]:
 
 
 def _strengths_above_zero(named: LineNames) -> Floats:
-    """Strengths (f,) in Pa, above 0 for candidates too."""
+    """Strengths (f,) in Pa, above 0 even for candidates."""
     return np.maximum(named.strengths, FITTED * named.strengths.max(initial=1e-300))
 
 
@@ -182,7 +182,7 @@ def _fit(named: LineNames, response: Response) -> _Fit:
 
 
 def _peaks(response: Response, fit: _Fit) -> list[Unnamed]:
-    """Peaks in the spectrum of the whole response less the fitted lines."""
+    """Peaks in the spectrum of the whole response minus the fitted lines."""
     dt, begun = step(response.times), round(SETTLE * len(fit.rest))
     amplitude = windowed_amplitude(fit.rest, WINDOW)
     round_off = ROUND_OFF * float(np.abs(response.values).max(initial=0.0))
@@ -219,7 +219,9 @@ def _offset(three: Floats) -> float:
 
 
 def _decays(x: Floats, turns: float) -> bool:
-    """Whether signals (t, p) are weaker in their second half, at so many turns per sample."""
+    """Whether signals (t, p) are weaker in their second half, at a frequency in turns per
+    sample.
+    """
     half = len(x) // 2
     wave = cosines("hann", half) * np.exp(-2j * np.pi * turns * np.arange(half))
     first, second = (np.linalg.norm(wave @ part) for part in (x[:half], x[-half:]))
@@ -229,7 +231,7 @@ def _decays(x: Floats, turns: float) -> bool:
 def _with_weak(
     named: LineNames, weak: LineNames, steady: Sequence[float], least: float
 ) -> LineNames:
-    """Add to some lines the strongest of the weaker ones near each frequency (k,) in Hz."""
+    """Add to the named lines the strongest weak one near each frequency (k,) in Hz."""
     more = []
     for f in steady:
         near = np.flatnonzero(np.abs(weak.frequencies - f) < least)
@@ -239,9 +241,7 @@ def _with_weak(
 
 
 def _apart(other_lines: Mapping[str, float], named: LineNames, same: float) -> LineNames:
-    """Other lines by name that do not coincide with lines of the load, as strong as its
-    strongest.
-    """
+    """Other lines by name that coincide with no line of the load, as strong as its strongest."""
     f = np.array(list(other_lines.values()), np.float64)
     strongest = named.strengths.max(initial=0.0) or 1.0
     strengths = np.full(len(f), strongest)

@@ -1,4 +1,4 @@
-"""Numbers in pages, tables, captions and records: the one formatter of the project.
+"""Numbers in pages, tables, captions and records: the only formatter of the project.
 
 `significant` formats a number, `with_error` one with a standard error, `interval` a range;
 `decibel`, `percent`, and `stated_error` for an expected relative error.
@@ -32,8 +32,8 @@ def as_sentence(text: str) -> str:
 
 
 def with_error(value: float, error: float, digits: int = 3) -> str:
-    """Format a number with its standard error: the error to two digits, the number to as many
-    places.
+    """Format a number with its standard error: the error to two digits, the number to the same
+    decimal place.
 
     If the error is not known (not finite, or 0), the number has `digits` significant digits.
 
@@ -53,9 +53,7 @@ def interval(low: float, high: float, digits: int = 2) -> str:
 
 
 def decibel(value: float, *, signed: bool = False) -> str:
-    """Format a level in dB, without unit, to 0.1 dB: "< -120" below `FAINTEST`, "-" if not
-    finite.
-    """
+    """Format a level in dB to 0.1, without unit: "< -120" below `FAINTEST`, "-" if not finite."""
     if value < FAINTEST:
         return f"< {FAINTEST:g}"
     if not isfinite(value):
@@ -65,7 +63,7 @@ def decibel(value: float, *, signed: bool = False) -> str:
 
 
 def percent(share: float) -> str:
-    """Format a share in percent to two digits."""
+    """Format a share in percent to two significant digits."""
     return f"{significant(100 * share, 2)} %"
 
 
@@ -79,7 +77,7 @@ def plural(number: int, thing: str) -> str:
 
 
 def stated_error(error: float) -> str:
-    """Format an expected relative error; errors below `LEAST` are not resolved."""
+    """Format an expected relative error; those below `LEAST` are given as a bound."""
     if not isfinite(error):
         return "not known"
     return f"below {percent(LEAST)}" if error < LEAST else percent(error)

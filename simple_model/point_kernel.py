@@ -2,8 +2,8 @@
 
 Nothing propagates: the stimulation at a skin point is the moving pressure there at that time, the
 pressure of the focus weighted by distance. As published, the load is the commanded signal itself
-(drive law "linear") in a focal spot without side lobes ("main_lobe"). Under any other load the
-model is the same.
+(drive law "linear") in a focal spot without side lobes ("main_lobe"). The same model applies to any
+other load.
 """
 
 from __future__ import annotations
@@ -24,16 +24,14 @@ from simple_model.typing import Floats
 
 
 def published_load(pressure: MovingPressure) -> MovingPressure:
-    """Return the same Tacton and height under the load of the paper: linear drive, main lobe, no
-    mean.
-    """
+    """Return the same Tacton under the load of the paper: linear drive, main lobe, no mean."""
     return replace(pressure, drive=PUBLISHED, profile="main_lobe")
 
 
 def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
     """Compute the stimulation under the published load, whatever the given drive law and focus.
 
-    Parameters and result are those of `point_kernel`.
+    Parameters, result and errors are those of `point_kernel`.
     """
     response = point_kernel(published_load(pressure), probes, times)
     return replace(response, model="point-kernel-published")
@@ -42,8 +40,8 @@ def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: F
 def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
     """Compute the stimulation under the given load.
 
-    If the focus or its modulation is too fast for the samples, lines above half the sampling rate
-    are left out.
+    Lines above half the sampling rate are left out. Raises a ValueError for probes of another
+    shape.
 
     Parameters
     ----------

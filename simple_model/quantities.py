@@ -34,7 +34,7 @@ Rows = Callable[[Material], Floats]
 
 
 class NotApplicable(ValueError, AttributeError):
-    """A response does not have an attribute; `hasattr` returns False."""
+    """A response does not have this attribute, so that `hasattr` returns False."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,9 +45,9 @@ class Quantity:
     ----------
     name, symbol, words : str, for scenes and files, for formulas (TeX), and for sentences
     unit : str, SI
-    shown, per_unit : str and float, unit on axes and in tables, and its number per SI unit
+    shown, per_unit : str, float, unit on axes and in tables, and how many make the SI unit
     column : str, of lines.csv
-    field : NORMAL, VECTOR or STRAIN, field of a body that it is read from; "" for none
+    field : NORMAL, VECTOR or STRAIN, the field of a body to read; "" for none
     rows : material -> components (c, k) of the field (k,) at rest
     rate : int, order of the time derivative
     relaxes : bool, whether it is proportional to the complex modulus
@@ -82,13 +82,11 @@ class Quantity:
         return self.field == NORMAL
 
     def factor(self, s: Any, modulus: Any = 1.0) -> Any:
-        """Factor of its components at complex frequencies s in rad/s; `modulus` is relative to
-        rest.
-        """
+        """Factor of its components at complex s in rad/s; `modulus` is relative to that at rest."""
         return np.asarray(s) ** self.rate * (modulus if self.relaxes else 1.0)
 
     def text(self, value: float, digits: int = 3) -> str:
-        """Format an SI value with the unit that is shown."""
+        """Format an SI value in the unit of axes and tables."""
         return f"{significant(self.per_unit * value, digits)} {self.shown}"
 
     def waveforms(self, components: Floats, probes: int) -> Floats:
@@ -101,7 +99,7 @@ QUANTITIES: dict[str, Quantity] = {}
 
 
 def register(quantity: Quantity) -> Quantity:
-    """Add a quantity that scenes may use; raises a ValueError if the name exists."""
+    """Register a quantity for scenes; raises a ValueError if the name exists."""
     if quantity.name in QUANTITIES:
         raise ValueError(f"quantity '{quantity.name}' is already registered; choose another name")
     QUANTITIES[quantity.name] = quantity
@@ -109,7 +107,7 @@ def register(quantity: Quantity) -> Quantity:
 
 
 def quantity(name: str) -> Quantity:
-    """Return the quantity of a name; raises a ValueError for an unknown name."""
+    """Return the quantity with a name; raises a ValueError for an unknown name."""
     return QUANTITIES[choose("quantity", name, QUANTITIES)]
 
 

@@ -78,18 +78,16 @@ class Response:
     quantity : a name in `quantities.QUANTITIES`; normal motion is positive into the body
     effort : Effort
     expected_error : float, estimated before the run, relative to the waveforms; nan if unknown
-    load : MovingPressure that defines its `lines`; None if unknown
+    load : MovingPressure that defines the `lines`; None if unknown
 
-    The arrays are copied and read-only. Raises a ValueError if shapes do not fit, a number is not
-    finite, times are not equally spaced or the quantity is unknown.
+    The arrays are copied and read-only. Raises a ValueError if shapes do not fit, if a number is
+    not finite, if times are not equally spaced, or if the quantity is unknown.
 
     >>> times = np.arange(1000) / 1e4
     >>> x = 1e-6 * np.sin(2 * np.pi * 140 * times)
     >>> response = Response(model="made", times=times, probes=[[0.0, 0.0]], values=x[:, None])
     >>> response
     <Response of made: displacement into the body (1,000 times, 1 probe) from 0 to 99.9 ms, ...>
-    >>> lines(response, [140.0]).round(9)  # m
-    array([[1.e-06]])
     """
 
     model: str
@@ -123,16 +121,14 @@ class Response:
 
     @property
     def displacement(self) -> Floats:
-        """Values (t, p) of a normal displacement or of the pressure of the point kernel; otherwise
-        a ValueError.
-        """
+        """Values (t, p) of a normal displacement or a pressure; raises a ValueError for others."""
         if self.record not in (DISPLACEMENT, PRESSURE):
             raise NotApplicable(f"this is a response of {self.quantity}; use its `values`")
         return self.values
 
     @property
     def lines(self) -> Lines:
-        """Resolved lines of its load by name; a ValueError if the load is unknown."""
+        """Resolved lines of its load by name; raises a ValueError if the load is unknown."""
         if self.load is None:
             raise NotApplicable(
                 "the load of this response is unknown, so its lines have no names; use "
@@ -166,8 +162,8 @@ class Response:
         return ax
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return the values as a table: rows by time_s, columns by x_m and y_m of the probes. Its
-        `attrs` have unit, quantity, model, error and warnings.
+        """Return the values as a data frame: rows by time_s, columns by x_m and y_m of the probes.
+        Its `attrs` have unit, quantity, model, error and warnings.
         """
         pandas = library("pandas")
         names = [f"{axis}_m" for axis in "xyz"[: self.probes.shape[1]]]
@@ -240,7 +236,14 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
     """Compute the amplitude spectrum: frequencies (f,) in Hz and amplitudes (f, p) in the unit of
     the response.
 
-    A sinusoid of amplitude a on a bin shows as a under every window, a name in `spectra.COSINES`.
+    A sinusoid of amplitude a on a bin has the value a with every window of `spectra.COSINES`.
+
+    >>> times = np.arange(1000) / 1e4
+    >>> x = 1e-6 * np.sin(2 * np.pi * 140 * times)
+    >>> response = Response(model="made", times=times, probes=[[0.0, 0.0]], values=x[:, None])
+    >>> frequencies, amplitudes = spectrum(response)
+    >>> float(frequencies[amplitudes[:, 0].argmax()])  # Hz
+    140.0
     """
     amplitude = windowed_amplitude(response.values, window)
     amplitude[0] /= 2
@@ -254,8 +257,14 @@ def windowed_amplitude(x: Floats, window: str) -> Floats:
 
 
 def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
-    """Compute line amplitudes (f, p) in the unit of the response: the moduli of `phasors`, with its
-    arguments.
+    """Compute line amplitudes (f, p) in the unit of the response: the moduli of `phasors`.
+
+    >>> times = np.arange(1000) / 1e4
+    >>> x = 1e-6 * np.sin(2 * np.pi * 140 * times)
+    >>> response = Response(model="made", times=times, probes=[[0.0, 0.0]], values=x[:, None])
+    >>> lines(response, [140.0, 280.0]).round(9)  # m
+    array([[1.e-06],
+           [0.e+00]])
     """
     return np.abs(phasors(response, frequencies, settle=settle))
 
@@ -265,13 +274,14 @@ def phasors(response: Response, frequencies: ArrayLike, *, settle: float = SETTL
 
     All lines and the mean are fitted together under a Kaiser window, which suppresses leakage from
     other lines and from a transient that decays. Lines closer than one over the fitted time are
-    unresolved and share one amplitude: see `are_resolved`.
+    unresolved and share one amplitude, see `are_resolved`. Raises a ValueError for frequencies out
+    of range, or a response of too few samples.
 
     Parameters
     ----------
     response : Response
     frequencies : (f,) float, Hz, below half the sampling rate; 0 gives the mean
-    settle : fraction of the response that is left out at its start
+    settle : fraction of the response left out at its start
 
     Returns
     -------
@@ -292,18 +302,17 @@ def are_resolved(
     settle: float = SETTLE,
     strengths: ArrayLike | None = None,
 ) -> Bools:
-    """Find which lines are resolved, from 0 Hz and from each other.
+    """Return which lines are resolved from 0 Hz and from each other.
 
-    Frequencies that differ by at most `ALIKE` of the resolution are one line. Other lines nearer
-    than the resolution, and leakage of unresolved lines, may have 5 % of the strength of a resolved
-    line.
+    Frequencies that differ by at most `ALIKE` times the resolution are one line. Near a resolved
+    line, other lines and leakage of unresolved ones have at most 5 % of its strength.
 
     Parameters
     ----------
     response : Response
     frequencies : (f,) float, Hz
     strengths : (f,) float, in any unit; equal if not given
-    settle : fraction of the response that is left out at its start
+    settle : fraction of the response left out at its start
 
     Returns
     -------
@@ -321,8 +330,8 @@ def are_resolved(
 
 
 def is_separate(frequencies: Floats, strengths: Floats, least: float) -> Bools:
-    """Whether lines nearer than `least` Hz, or the mean, have at most 5 % of each line (f,), by
-    frequencies in Hz and strengths (f,).
+    """Return a mask (f,) of lines whose neighbours within `least` Hz, including the mean, have at
+    most 5 % of their strength.
     """
     away = np.abs(frequencies[:, None] - frequencies)
     near, alike = away < least, away <= ALIKE * least
@@ -339,8 +348,8 @@ def is_masked(
     *,
     settle: float = SETTLE,
 ) -> Bools:
-    """Whether side lobes of lines that are not fitted, of amplitudes `rest` (f,), may exceed 5 % of
-    each line (f,), or 5 % of `FAINT` of the strongest.
+    """Return a mask (f,) of lines that side lobes of unfitted lines, of amplitudes `rest` (f,), may
+    change by 5 %, or by 5 % of `FAINT` of the strongest.
     """
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
@@ -359,9 +368,7 @@ def _kaiser_transform(x: Floats, beta: float) -> Floats:
 def fit_lines(
     response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[Complex, Floats]:
-    """Phasors (f, p) as of `phasors`, and the whole response (t, p) less these lines and
-    the mean.
-    """
+    """Return `phasors` (f, p), and the whole response (t, p) minus these lines and the mean."""
     t, x = response.times, response.values
     basis, weighted, inverse, which = _weighted_waves(t, frequencies, settle)
     fitted = inverse @ (weighted @ x[-weighted.shape[1] :])
@@ -373,7 +380,7 @@ def fit_lines(
 def line_rows(
     times: Floats, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[Floats, Floats, Ints]:
-    """Return the rows of the least squares of `fit_lines`, which give the errors of lines.
+    """Return the least-squares rows of `fit_lines`, from which the errors of lines follow.
 
     Waves (m, k) and rows (m, k) at the k fitted samples: coefficients (m,) are rows @ x, the fit is
     waves.T @ coefficients. Indices (2, f) give the coefficients of cosine and sine of each line.
@@ -418,12 +425,12 @@ def _waves(frequencies: Floats, times: Floats) -> Floats:
 
 
 def _closest(frequencies: Floats, span: float) -> float:
-    """Distance in bins of the closest of ascending frequencies, for a fitted time in s."""
+    """Distance in bins of the two closest ascending frequencies, for a fitted time in s."""
     return float(np.diff(frequencies).min(initial=np.inf) * span)
 
 
 def _beta(bins: float) -> float:
-    """Kaiser beta for lines so many bins apart, with a main lobe in proportion."""
+    """Kaiser beta for lines at a distance in bins; the main lobe is proportional to it."""
     lobe = np.hypot(1.0, LINE_BETA / np.pi) * min(bins / LINE_BINS, 1.0)
     return float(np.pi * np.sqrt(max(lobe**2 - 1, 0.0)))
 

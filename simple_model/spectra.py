@@ -85,7 +85,7 @@ class Lines:
         return quantity(self.quantity)
 
     def __getitem__(self, name: str) -> Complex:
-        """Amplitudes (p,) of a line by its name; raises a ValueError for an unknown name."""
+        """Amplitudes (p,) of the line with a name; raises a ValueError for an unknown name."""
         return np.asarray(self.amplitudes[self.names.index(choose("line", name, self.names))])
 
     def __len__(self) -> int:
@@ -99,7 +99,7 @@ class Lines:
         return f"<Lines of {self.record.words}: {counts}{strong}>"
 
     def plot(self, *, ax: "Axes | None" = None) -> "Axes":
-        """Draw the moduli at every probe, with the names of strong lines."""
+        """Draw the amplitudes at every probe, with the names of strong lines."""
         ax = new_axes(ax)
         size = self.record.per_unit * np.abs(self.amplitudes)
         largest = float(size.max(initial=0.0)) or 1.0
@@ -136,9 +136,7 @@ def _scale(ax: "Axes", frequencies: Floats, amplitudes: Floats, record: Quantity
 
 
 def cosines(name: str, n: int) -> Floats:
-    """Return the periodic window (n,) of a name in `COSINES`, without the slow import of
-    scipy.signal.
-    """
+    """Return the periodic window (n,) of a name in `COSINES`; importing scipy.signal is slow."""
     choose("window", name, COSINES)
     if n < 2:
         return np.ones(n)

@@ -36,8 +36,8 @@ MEASURED_FREQUENCY = 200.0  # Hz
 def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
     """Return the detection threshold (...) of displacement in m, peak, at frequencies (...) in Hz.
 
-    The area is "focal_spot", 0.58 cm2, or "large_contactor", 2.9 cm2, as in the measurements. NaN
-    below 10 and above 1000 Hz, where the curve does not apply.
+    The area is "focal_spot", 0.58 cm2, or "large_contactor", 2.9 cm2, as in the measurements. The
+    result is NaN below 10 and above 1000 Hz, where the curve does not apply.
 
     >>> 1e6 * threshold([40.0, 200.0]).round(8)  # micrometre
     array([3.98, 0.35])
@@ -65,14 +65,14 @@ def sensation_level(
 ) -> Floats:
     """Return the sensation level of lines: their level above the detection threshold.
 
-    Of several lines, the one with the highest level decides: channels do not add up.
+    The line with the highest level determines whether a signal is felt: channels do not add up.
 
     Parameters
     ----------
-    amplitude : (...) float, peak, of displacement or of pressure at a place
+    amplitude : (...) float, peak displacement or pressure of each line
     frequency : (...) float, Hz
-    area : as for `threshold`
-    unit : of the amplitude, "m" or "Pa", see `pressure_threshold`
+    area : see `threshold`
+    unit : of the amplitude, "m" or "Pa" (see `pressure_threshold`)
 
     Returns
     -------

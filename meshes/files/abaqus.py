@@ -33,9 +33,7 @@ Rows = list[list[str]]
 
 @dataclass
 class _Part:
-    """Nodes and elements by number, sets of elements, and the sets that *ELEMENT and
-    sections name.
-    """
+    """Nodes and elements by number, element sets, and the sets that *ELEMENT and sections name."""
 
     name: str
     nodes: dict[int, list[float]] = field(default_factory=dict)
@@ -197,7 +195,7 @@ def _join_parts(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
 
 
 def _kind(kind: str, nodes: int) -> str | None:
-    """meshio's name of an element type with so many nodes; None if unknown."""
+    """meshio's name of an element type with this number of nodes; None if unknown."""
     if expected := _solid_nodes(kind):
         return SOLIDS.get(nodes, kind) if nodes == expected else kind
     return FACES.get(nodes) if re.match(r"(?:S|STRI|M3D|R3D|SFM3D)[34]", kind) else None

@@ -41,9 +41,9 @@ class Contents:
     points : (n, 3) float, in the unit of the file
     tets : (m, 4) or (m, 10) int, m = 0 for a surface
     triangles : (k, 3) int of a surface; empty for a mesh, whose facets are in its sets
-    region : (m,) int; `names` has the names of those that have one
+    region : (m,) int; `names` has the names of regions that have one
     facets : name -> (j, 3) or (j, 6) int
-    notes : a sentence on each thing that was left out, merged or split
+    notes : a sentence on everything that was left out, merged or split
     """
 
     points: Floats
@@ -56,9 +56,7 @@ class Contents:
 
 
 def contents(path: Path, raw: Any) -> Contents:
-    """Return the contents of a mesh that meshio read, with its `notes` and region `names` in
-    `info`.
-    """
+    """Return the contents of a mesh that meshio read; its `info` has `notes` and region `names`."""
     counts: dict[str, int] = {}
     for block in raw.cells:
         if not len(block.data):
@@ -138,7 +136,7 @@ def _tetrahedra(
 
 
 def _once(tets: Ints, region: Ints) -> Ints:
-    """Numbers, ascending, of tetrahedra, without duplicates that belong to larger regions."""
+    """Ascending numbers of tetrahedra; of duplicates, the one in the smallest region remains."""
     _, place, count = np.unique(region, return_inverse=True, return_counts=True)
     order = np.argsort(count[place], kind="stable")
     _, first = np.unique(np.sort(tets[order, :4], axis=1), axis=0, return_index=True)
@@ -146,9 +144,7 @@ def _once(tets: Ints, region: Ints) -> Ints:
 
 
 def _fan(nodes: Ints, corners: int) -> tuple[Ints, Ints]:
-    """Triangles (k, 3) of plane cells, split at their lowest node number, and the cell (k,) of
-    each.
-    """
+    """Triangles (k, 3) of plane cells, split at their lowest node number, and their cell (k,)."""
     if corners == 3:
         return nodes[:, :3], np.arange(len(nodes))
     turn = (nodes[:, :4].argmin(axis=1)[:, None] + np.arange(4)) % 4
@@ -199,9 +195,7 @@ def _values(raw: Any, name: str, kind: str) -> np.ndarray:
 
 
 def _regions(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
-    """Region (e,) of each element from arrays, physical groups or element sets, and region
-    names.
-    """
+    """Region (e,) of each element from arrays, physical groups or element sets, and its names."""
     for name in NUMBERED:
         if name in raw.cell_data:
             region = _values(raw, name, kind)
@@ -271,9 +265,7 @@ def _facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, 
 
 
 def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, np.ndarray, Ints]:
-    """Faces (k, width) of tetrahedra that match plane cells, whether they do, and the cell
-    of each.
-    """
+    """Faces (k, width) of tetrahedra that match plane cells, a mask of matches, and their cells."""
     triangles, cell = _fan(nodes, corners)
     n = int(tets.max()) + 1
     faces = tets[:, FACES[:, :width]].reshape(-1, width)
@@ -288,9 +280,7 @@ def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, 
 
 
 def _node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
-    """Column for each node of 10-node tetrahedra (e, 10) in VTK's order, from the node
-    positions.
-    """
+    """Column for each node of 10-node tetrahedra (e, 10) in VTK's order, by the node positions."""
     nodes = points[tets]
     middles = nodes[:, EDGES].mean(axis=2)
     length = np.linalg.norm(nodes[:, EDGES[:, 1]] - nodes[:, EDGES[:, 0]], axis=2)

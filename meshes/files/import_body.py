@@ -65,11 +65,11 @@ def body_from_file(
     up : axis of the file that points to the device: +x, -x, ... -z
     inner : files of closed surfaces inside it, such as bones. Each becomes a region with the name
         of its file.
-    clip : least and greatest x, then least and greatest y, m from the middle of the palm
+    clip : smallest and largest x, then y, m from the middle of the palm
     keep_largest : keep only the largest of several separate pieces
     cap : close holes of a surface whose edges lie in a plane, such as an open wrist
     timeout : float, s, limit for the mesher
-    say : receives a sentence on each finding and change
+    say : receives a sentence about each defect and change
     progress : receives the name of each phase, and 0
 
     Returns
@@ -78,8 +78,8 @@ def body_from_file(
         of the file, `surface`, `top` (visible from above), `cut` (the sides of the clip) and
         `bottom`.
 
-    Raises a MeshError if the file cannot be read or repaired, its size is not that of a hand, or
-    the mesher fails.
+    Raises a MeshError if the file cannot be read or repaired, if its size is not that of a hand, or
+    if the mesher fails.
     """
     progress(f"reading {Path(path).name}", 0.0)
     scale, contents = scale_of(unit), read_contents(path)
@@ -118,7 +118,7 @@ def body_from_file(
 def _inner_surfaces(
     paths: Sequence[PathLike], outer: Surface, *, unit: str, up: str, say: Say
 ) -> dict[str, Surface]:
-    """Surfaces inside another by the names of their files, repaired and checked."""
+    """Surfaces inside another one, repaired and checked, by the names of their files."""
     names = [REST, *(Path(path).stem for path in paths)]
     if twice := [str(path) for path in paths if names.count(Path(path).stem) > 1]:
         raise MeshError(

@@ -31,7 +31,7 @@ WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # gmsh cannot read the version 4.1 
 
 
 def read_contents(path: str | os.PathLike[str]) -> Contents:
-    """Return everything in a file that a body can be made of.
+    """Return the parts of a file that a body can be made of.
 
     Raises a MeshError if the file is missing, damaged, of an unknown kind, or has no suitable
     cells.

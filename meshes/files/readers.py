@@ -77,7 +77,7 @@ def _read(path: Path) -> Any:
 
 
 def _read_vtk(path: Path) -> Any:
-    """The cells of all data sets of a VTK file. Several data sets with solid cells are regions."""
+    """The cells of all data sets of a VTK file. If several have solid cells, each is a region."""
     import meshio
     import pyvista
 
@@ -164,7 +164,7 @@ def _kinds(grid: Any, dimension: int | None = None) -> list[int]:
 
 
 def _check_unread(path: Path, kind: str) -> None:
-    """Refuse what meshio's readers ignore: coordinate systems of Nastran, partitions of gmsh."""
+    """Refuse what meshio ignores: coordinate systems of Nastran, partitions of gmsh."""
     content = path.read_bytes()
     if kind == "gmsh" and b"$EndElements" not in content:
         raise MeshError(

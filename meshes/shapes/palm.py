@@ -7,8 +7,8 @@ origin is the middle of the palm, on its surface. The body is where the level se
 
 `box` is the exact distance from a slab with rounded corners and edges, a mound the first-order
 distance from an ellipsoid, and `join` a smooth minimum with continuous second derivatives. It
-differs from the minimum only where the two differ by less than the height of the mound. Near the
-surface, F is the distance from it within a few per cent. Without cup and mounds, the top is the
+differs from the minimum only where box and mound differ by less than the height of the mound. Near
+the surface, F is the distance from it within a few per cent. Without cup and mounds, the top is the
 plane z = 0 up to `edge_radius` from the sides.
 """
 
@@ -81,9 +81,7 @@ def level_set(palm: Palm, points: ArrayLike) -> Floats:
 
 
 def gradient(palm: Palm, points: ArrayLike) -> Floats:
-    """Return the derivatives (n, 3) of `level_set`, about a unit outward normal near the
-    surface.
-    """
+    """Return the gradient (n, 3) of `level_set`, about a unit outward normal near the surface."""
     return _field(palm, np.asarray(points, np.float64))[1]
 
 

@@ -78,6 +78,8 @@ def sheet(
     -------
     TetMesh
 
+    Raises a MeshError if a length is not above 0 or there are too many cells.
+
     >>> sheet(0.1, 0.08, 1e-3, 0.01)
     <TetMesh: 1,071 nodes, 480 tetrahedra of 10 nodes, 1 regions; facets back, ...>
     """
@@ -110,6 +112,8 @@ def block(
     -------
     TetMesh
 
+    Raises a MeshError if a length is not above 0 or there are too many cells.
+
     >>> mesh = block((0.04, 0.04, 0.01), 0.005)
     >>> len(mesh.tets), sorted(mesh.facets)[:3]
     (768, ['absorbing', 'back', 'bottom'])
@@ -129,9 +133,7 @@ def block(
 
 
 def middle_plane(mesh: TetMesh) -> Ints:
-    """Return the triangles (k, 6) in the middle plane of an extruded sheet, one below each facet of
-    its top.
-    """
+    """Return the triangles (k, 6) in the middle plane of an extruded sheet, in order of its top."""
     top = facet_set(mesh, "top")
     low, high = mesh.points[:, 2].min(), mesh.points[:, 2].max()
     layer = np.flatnonzero(np.abs(mesh.points[:, 2] - (low + high) / 2) < 1e-9 * (high - low))
@@ -207,9 +209,7 @@ def graded_axis(length: float, h: float, grading: Grading) -> Floats:
 
 
 def with_planes(line: Floats, planes: Iterable[float]) -> Floats:
-    """Return grid lines with additional ones at given places, which replace lines that are too
-    close.
-    """
+    """Return grid lines with additional ones at given places, without lines too close to these."""
     places = np.array(sorted(planes))
     inner = line[1:-1]
     if len(places) and len(inner):
@@ -231,8 +231,8 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
 
     Returns
     -------
-    TetMesh with the facet sets `top`, `bottom`, `sides` and, at least and greatest x and y, `left`,
-        `right`, `front` and `back`
+    TetMesh with the facet sets `top`, `bottom`, `sides`, `left` and `right` (smallest and largest
+    x), `front` and `back` (smallest and largest y)
 
     Raises a MeshError if grid lines do not increase or there are too many cells.
 
@@ -262,6 +262,9 @@ def extruded(plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int
     triangles : (k, 3) int, nodes of the plane
     z : increasing heights of the layers, m
     order : 1 or 2, four- or ten-node tetrahedra
+    Returns
+    -------
+    TetMesh
     """
     ranked = np.sort(np.asarray(triangles), axis=1)  # the same order everywhere: neighbours conform
     points, tets = _layers(np.asarray(plane), ranked, np.asarray(z))
@@ -328,7 +331,7 @@ def _cells(length: float, h: float, *, least: int = 2) -> Floats:
 
 
 def check_size(cells: Iterable[float], order: int = 2) -> None:
-    """Refuse numbers of cells along three axes that give more than `MOST_UNKNOWNS`."""
+    """Refuse numbers of cells along the three axes that give more than `MOST_UNKNOWNS`."""
     unknowns = 3.0 * prod(order * n + 1 for n in cells)
     if not unknowns <= MOST_UNKNOWNS:
         raise MeshError(

@@ -30,9 +30,7 @@ def rotation_to_z(up: str) -> Floats:
 
 
 def align(surface: Surface) -> tuple[Surface, Floats]:
-    """Move a surface so that its top above the widest circle is the origin; also return the shift
-    (3,) in m.
-    """
+    """Move the top above the widest circle to the origin; return surface and shift (3,) in m."""
     x, y, _ = widest_circle(surface)
     shift = -np.array([x, y, height_at(surface, x, y)])
     return Surface(points=surface.points + shift, triangles=surface.triangles), shift
@@ -41,8 +39,8 @@ def align(surface: Surface) -> tuple[Surface, Floats]:
 def shift_to_origin(surface: Surface) -> Floats:
     """Return the shift (3,) in m that brings the top of a surface to the origin.
 
-    It is 0 if the origin already lies on the top, at least 3 mm or half the radius of the widest
-    circle inside the outline; otherwise it is that of `align`.
+    It is 0 if the origin already lies on the top and inside the outline, by 3 mm or by half the
+    radius of the widest circle; otherwise it is that of `align`.
     """
     x, y, radius = widest_circle(surface)
     low, cell, depth = _outline(surface)
@@ -85,7 +83,7 @@ def _outline(surface: Surface) -> tuple[Floats, float, Floats]:
 
 
 def height_at(surface: Surface, x: float, y: float) -> float:
-    """Return the greatest z in m of the surface above a point of the plane."""
+    """Return the largest z in m of the surface above a point of the plane."""
     highest = heights_over(surface.points[surface.triangles], np.array([x, y])).max()
     if highest == -np.inf:
         place = f"({1e3 * x:.4g}, {1e3 * y:.4g}) mm"
@@ -96,8 +94,8 @@ def height_at(surface: Surface, x: float, y: float) -> float:
 def clip_to_box(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]:
     """Return the closed part of a closed surface within a box, and sentences on the cuts.
 
-    `box` is the least and greatest x, then y, in m. Of several pieces, the one below the origin is
-    kept.
+    `box` is the smallest and largest x, then y, in m. If several pieces remain, the one below the
+    origin is kept.
     """
     left, right, front, back = box
     if not (left < 0 < right and front < 0 < back):
@@ -119,9 +117,7 @@ def clip_to_box(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[s
 
 
 def cut_to_box(surface: Surface, box: Sequence[float]) -> tuple[Surface | None, int]:
-    """Return the closed part of a surface within a box, or None, and the number of sides that cut
-    it.
-    """
+    """Return the closed part of a surface in a box, or None, and how many sides cut it."""
     import pyvista
 
     faces = np.column_stack([np.full(len(surface.triangles), 3), surface.triangles])

@@ -44,7 +44,9 @@ def check(surface: Surface) -> None:
 
 
 def check_manifold(surface: Surface) -> None:
-    """Refuse open, crowded or inconsistently oriented edges, and pinched points."""
+    """Refuse open edges, edges of more than two triangles, inconsistent orientation, and points
+    where parts only touch.
+    """
     pairs = _paired_edges(surface)
     against = pairs[_starts(surface)[pairs[:, 0]] == _starts(surface)[pairs[:, 1]]]
     if len(against):
@@ -72,8 +74,8 @@ def repaired(
 ) -> tuple[Surface, list[str]]:
     """Repair seams, duplicates and orientation of a surface.
 
-    Coinciding points are merged. Triangles without three different corners and duplicates are
-    dropped. The rest is oriented outwards.
+    Coinciding points are merged. Triangles without three different corners, and duplicates, are
+    removed. The rest is oriented outwards.
 
     Parameters
     ----------
@@ -85,8 +87,8 @@ def repaired(
     -------
     Surface, and a sentence on each change
 
-    Raises a MeshError if the surface is open, has edges with more than two triangles, or has only
-    one side; or if a hole to be capped is not plane.
+    Raises a MeshError if the surface is open, has edges with more than two triangles or only one
+    side, or if a hole to be capped is not plane.
 
     >>> from meshes import block, boundary_facets
     >>> box = block((0.02, 0.02, 0.02), 0.02, order=1)
@@ -160,7 +162,7 @@ def _with_caps(surface: Surface, notes: list[str]) -> Surface:
 
 
 def first_coincident(points: Floats) -> Ints:
-    """Return the number (n,) of the first point that each of points (n, 3) coincides with."""
+    """Return for each point (n, 3) the number (n,) of the first point at the same place."""
     from scipy.spatial import cKDTree
 
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))

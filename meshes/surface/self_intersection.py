@@ -15,9 +15,7 @@ CHUNK = 200_000  # pairs tested at once
 
 
 def self_intersections(surface: Surface) -> Ints:
-    """Return the pairs (m, 2) of triangles that intersect or overlap. Contact at shared corners is
-    allowed.
-    """
+    """Return the pairs (m, 2) of triangles that touch elsewhere than at shared corners."""
     corners = surface.points[surface.triangles] - surface.points.mean(axis=0)
     pairs = _candidates(corners)
     crossing = [
@@ -96,9 +94,7 @@ def _heights(p: Floats, q: Floats, scale: Floats) -> Floats:
 def _pierces(
     start: Floats, end: Floats, from_: Floats, to: Floats, triangle: Floats, scale: Floats
 ) -> np.ndarray:
-    """Whether each side, with the given heights of its ends above the plane, passes through the
-    triangle.
-    """
+    """Whether each side, whose ends are at given heights, passes through the triangle."""
     passes = from_ * to < 0
     share = np.divide(from_, from_ - to, out=np.zeros_like(from_), where=passes)
     at = start + share[:, None] * (end - start)
@@ -113,7 +109,7 @@ def _pierces(
 
 
 def _overlap(p: Floats, q: Floats, scale: Floats) -> np.ndarray:
-    """Whether triangles in one plane overlap, that is, no side of either separates them."""
+    """Whether triangles in one plane overlap: no side of either one separates them."""
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     apart = np.linalg.norm(normal, axis=1) <= (
         ROUND_OFF * scale**2

@@ -19,8 +19,8 @@ class Surface:
     points : (n, 3) float, m
     triangles : (k, 3) int, point numbers from 0
 
-    Raises a MeshError if shapes or point numbers do not fit, there is no triangle, or a point is
-    not finite.
+    Raises a MeshError if shapes or point numbers do not fit, if there is no triangle, or if a point
+    is not finite.
     """
 
     points: Floats
@@ -67,7 +67,7 @@ def thinnest(surface: Surface) -> float:
 
 
 def compact(points: Floats, triangles: Ints) -> Surface:
-    """Return the surface of these triangles, without the points that they do not use."""
+    """Return the surface of these triangles, without unused points."""
     used, numbers = np.unique(triangles, return_inverse=True)
     return Surface(points=points[used], triangles=numbers.reshape(-1, 3))
 

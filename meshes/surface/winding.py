@@ -48,7 +48,7 @@ def join(surfaces: list[Surface]) -> Surface:
 
 
 def check_inside(outer: Surface, inner: Mapping[str, Surface]) -> None:
-    """Refuse surfaces that are not closed, lie outside another one, or cross it or each other."""
+    """Refuse inner surfaces that are open, lie outside the outer one, or cross it or each other."""
     for name, surface in inner.items():
         try:
             check(surface)

@@ -28,7 +28,7 @@ def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> Te
     Parameters
     ----------
     mesh : TetMesh of ten-node tetrahedra
-    level_set, gradient : functions of points (n, 3) in m: values (n,), slopes (n, 3)
+    level_set, gradient : functions of points (n, 3) in m that return values (n,) and slopes (n, 3)
 
     Returns
     -------
@@ -84,9 +84,7 @@ def _mean_edge(mesh: TetMesh) -> Floats:
 
 
 def keep_jacobians(tets: Ints, straight: Floats, points: Floats) -> tuple[Floats, int]:
-    """Return curved points (n, 3), straight where elements would be distorted, and how many are
-    straight.
-    """
+    """Return points (n, 3), curved unless this distorts elements, and how many are straight."""
     return restore_bad(
         straight, points, tets[:, 4:], lambda at: jacobian_ratios(at, tets) < LEAST_RATIO
     )

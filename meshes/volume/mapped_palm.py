@@ -42,7 +42,7 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     -------
     TetMesh with the facet sets `surface`, `top` (visible from above), `wrist`, `fingers` and `back`
 
-    Raises a MeshError if there are too many cells, or the relief is too steep for them.
+    Raises a MeshError if there are too many cells or the relief is too steep.
     """
     cells = (len(x) - 1, len(y) - 1, len(z) - 1)
     tets = kuhn_tets(cells)

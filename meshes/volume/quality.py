@@ -28,9 +28,7 @@ def dihedral_angles(mesh: TetMesh) -> Floats:
 
 
 def angles_between_faces(points: Floats, tets: Ints) -> Floats:
-    """Return the dihedral angles (m, 6) in degrees of tetrahedra (m, 4 or 10) with positive
-    volume.
-    """
+    """Return the dihedral angles (m, 6) in degrees of tetrahedra (m, 4 or 10), not inverted."""
     corners = points[tets[:, :4]]
     faces = corners[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]]
     normals = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
@@ -57,7 +55,8 @@ def _determinants(nodes: Floats, at: Floats) -> Floats:
 
 
 def jacobian_ratios(points: Floats, tets: Ints) -> Floats:
-    """Return the least ratio (m,) of det J of each 10-node element to that of its straight element.
+    """Return the smallest ratio (m,) of det J of each 10-node element to that of its straight
+    element.
 
     It is evaluated at the corners, the edge middles and the four Gauss points: 1 without curved
     edges, 0 or negative for a folded element.
@@ -75,9 +74,7 @@ def jacobian_ratios(points: Floats, tets: Ints) -> Floats:
 def restore_bad(
     points: Floats, moved: Floats, tets: Ints, are_bad: Callable[[Floats], np.ndarray]
 ) -> tuple[Floats, int]:
-    """Return points (n, 3) with those of bad elements (m, a) restored until none is bad, and how
-    many.
-    """
+    """Return moved points (n, 3), restored until no element (m, a) is bad, and how many were."""
     count = 0
     while True:
         nodes = np.unique(tets[are_bad(moved)])
@@ -91,10 +88,10 @@ def restore_bad(
 def check_one_body(
     mesh: TetMesh, *, keep_largest: bool = False, say: Callable[[str], None] = print
 ) -> TetMesh:
-    """Return a mesh, or its largest body on request.
+    """Return a mesh, or its largest body if `keep_largest`.
 
-    Raises a MeshError if tetrahedra overlap, they form several bodies, or their boundary is open,
-    pinched or intersects itself.
+    Raises a MeshError if tetrahedra overlap or form several bodies, or if their boundary is open,
+    touches itself at a point, or intersects itself.
     """
     _check_overlaps(mesh)
     body, volumes = _bodies(mesh)

@@ -24,8 +24,8 @@ GOOD = 25.0  # degrees: least angles below it may not shrink, and others not fal
 
 
 def smooth(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
-    """Return a four-node mesh with its inner nodes moved, so that no least angle below 25 degrees
-    shrinks.
+    """Return a four-node mesh with moved inner nodes; no smallest angle below 25 degrees gets
+    smaller.
 
     Nodes on the boundary and between regions stay. `sizing` maps points (n, 3) to target edge
     lengths (n,) in m; None for equal sizes.
@@ -44,7 +44,7 @@ def smooth(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
 
 
 def _widen(points: Floats, patch: Ints, node: int) -> None:
-    """Move a node by trial to where the least angle of its elements is largest."""
+    """Move a node by trial to where the smallest angle of its elements is largest."""
     best = _least_angles(points, patch).min()
     length = np.linalg.norm(np.ptp(points[patch], axis=1), axis=1).mean()
     for reach in length * TRIAL_STEPS:

@@ -54,18 +54,18 @@ def tetrahedralise(
     ----------
     surface : Surface
     h : float, m, target edge length
-    inner : name of a region and the closed surface around it, inside the other one or cut off with
-        it at one plane
-    sizing : function of points (n, 3) to target edge lengths (n,), m; None for h everywhere
+    inner : region name -> closed surface inside the outer one, or cut off with it at one plane
+    sizing : function of points (n, 3) that returns target edge lengths (n,) in m; None for h
+        everywhere
     timeout : float, s, limit for the mesher
 
     Returns
     -------
-    TetMesh with its facets in the set `surface`. With inner surfaces it has the region 0 outside of
-        them and a named region from 1 for each.
+    TetMesh with its facets in the set `surface`. With inner surfaces, region 0 is outside them, and
+    each has a named region, from 1.
 
-    Raises a MeshError if the surface is not sound, h or a size is out of range, or the mesher
-    fails, takes too long, or returns a bad mesh.
+    Raises a MeshError if the surface is not sound, if h or a size is out of range, or if the mesher
+    fails, takes too long or returns a bad mesh.
     """
     check(surface)
     check_size(surface, "h", h)
@@ -99,9 +99,7 @@ def tetrahedralise(
 
 
 def graded(h: float, grading: Grading) -> Sizing:
-    """Return a sizing function: h within the grading's radius of the origin, growing to
-    `coarsest`.
-    """
+    """Return a sizing function: h within `grading.radius` of the origin, growing to `coarsest`."""
     slope = float(np.log(grading.growth))
 
     def sizes(points: Floats) -> Floats:
@@ -215,7 +213,7 @@ def _with_regions(mesh: TetMesh, inner: Mapping[str, Surface]) -> TetMesh:
 
 
 def _checked_result(surface: Surface, epsilon: float, points: Floats, tets: np.ndarray) -> TetMesh:
-    """The mesh, if it fills the surface and has no bad element."""
+    """The mesh, checked to fill the surface and to have no bad element."""
     if not len(tets):
         raise MeshError("the mesher returned no tetrahedra; give a thicker body")
     used, numbers = np.unique(tets, return_inverse=True)

@@ -18,8 +18,8 @@ from simple_model.typing import Complex
 
 @dataclass(frozen=True)
 class Compliance:
-    """Compliance G: (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w (f,
-    1) in rad/s. At frequencies w (f,) no pole lies between the real axis of k and `clearance`, 1/m.
+    """Compliance G: (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w
+    (f, 1) in rad/s. No pole lies between the real axis of k and `clearance` (f,) in 1/m.
     """
 
     answer: Callable[[Complex, Complex], Complex]
@@ -34,9 +34,7 @@ AIR_DENSITY = 1.2  # kg/m3
 
 
 def layered(stack: Stack) -> Compliance:
-    """Return the compliance of a stack of layers by stiffness matrices, or of a half-space in
-    closed form.
-    """
+    """Return the compliance of a stack of layers, in closed form for a half-space."""
     if stack.thicknesses == (inf,):
         return half_space(stack.materials[0])
     return Compliance(partial(surface_compliance, stack), partial(clearance, stack))

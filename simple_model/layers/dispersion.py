@@ -75,13 +75,13 @@ class Mode:
 
     @property
     def is_wave(self) -> Bools:
-        """Whether it carries energy at each frequency (f,)."""
+        """Whether the mode carries energy at each frequency (f,)."""
         return np.asarray((self.kinds != "evanescent") & (self.kinds != ""))
 
     @cached_property
     def cut_on(self) -> float:
-        """Lowest frequency in Hz at which it carries energy, where k^2 crosses the imaginary axis;
-        inf if there is none.
+        """Lowest frequency in Hz at which the mode carries energy, where k^2 crosses the imaginary
+        axis; inf if there is none.
         """
         if not self.is_wave.any():
             return np.inf
@@ -112,8 +112,8 @@ class Mode:
         return np.asarray(CubicHermiteSpline(x, k**2, slope, extrapolate=False)(f))
 
     def amplitude(self, width: float, distance: float) -> Complex:
-        """Motion (f,) of the surface in m/Pa by this mode, at a distance in m from the middle of a
-        Gaussian spot of standard deviation `width`.
+        """Motion (f,) of the surface in m/Pa in this mode, at a distance in m from the middle of a
+        Gaussian spot with standard deviation `width` in m.
         """
         # The energy of a backward wave travels outwards, so its k takes the same Hankel function.
         k = self.wavenumbers
@@ -183,9 +183,7 @@ def dispersion_curves(
 
 
 def _leaking(stack: Stack, omega: Floats) -> Floats:
-    """Wavenumber (f,) in 1/m below which waves leak into the half-space of a stack; 0
-    without one.
-    """
+    """Wavenumber (f,) in 1/m below which waves leak into a half-space below; 0 without one."""
     if not stack.is_half_space:
         return np.zeros(len(omega))
     below = stack.materials[-1]
@@ -193,9 +191,7 @@ def _leaking(stack: Stack, omega: Floats) -> Floats:
 
 
 def _roots(stack: Stack, omega: Floats, most: int) -> tuple[Roots, Floats]:
-    """Roots of a stack at frequencies (f,) in rad/s, at most `most` of each, and depths of
-    shapes.
-    """
+    """Roots of a stack at (f,) rad/s, at most `most` at each, and the depths of their shapes."""
     moduli, slopes = modulus_and_slope(stack, omega)
     solve = modes_above_half_space if stack.is_half_space else _finite
     return solve(stack, omega, moduli, slopes, most)
@@ -206,7 +202,7 @@ def _is_evanescent(wavenumbers: Complex) -> Bools:
 
 
 def checked_frequencies(frequencies: ArrayLike) -> Floats:
-    """Return frequencies (f,) in Hz; a ValueError unless they are finite, above 0 and ascending."""
+    """Return frequencies (f,) in Hz; raise a ValueError unless finite, above 0 and ascending."""
     f = np.atleast_1d(np.asarray(frequencies, np.float64))
     rises = np.isfinite(f).all() and f.ndim == 1 and (np.diff(f, prepend=0) > 0).all()
     if not (len(f) and rises):
@@ -229,7 +225,7 @@ def modulus_and_slope(stack: Stack, omega: Floats) -> tuple[Complex, Complex]:
 def _finite(
     stack: Stack, omega: Floats, moduli: Complex, slopes: Complex, most: int
 ) -> tuple[Roots, Floats]:
-    """Least evanescent roots of a finite stack, and the depths of their shapes."""
+    """The least evanescent roots of a finite stack, and the depths of their shapes."""
     springless = replace(stack, base="free", base_stiffness=0.0) if stack.base_stiffness else stack
     own, change = pencil(stack, omega, moduli), pencil(springless, omega, slopes)
     squared, V, W = eigenpairs(own, omega)
@@ -316,13 +312,12 @@ def sheet_curves(
     air_density: float = AIR_DENSITY,
     tension: float = 0.0,
 ) -> DispersionCurves:
-    """Compute the dispersion curves of the bending wave of an infinite thin sheet, and of its near
-    field.
+    """Compute the dispersion curves of an infinite thin sheet: its bending wave and its near field.
 
     They are the poles of `compliance.thin_sheet`, D k^5 + T k^3 - m w^2 k - 2 rho_air w^2 = 0 with
-    Re k >= 0. Frequencies (f,) in Hz are above 0 and ascending, otherwise a ValueError; tension in
-    N/m is the same in all directions; an air density of 0 kg/m3 is vacuum. The shapes are at both
-    faces, along x by the rotation of the section, U = k W z from the middle.
+    Re k >= 0. Frequencies (f,) in Hz must be above 0 and ascending (ValueError). Tension in N/m is
+    the same in all directions. An air density of 0 kg/m3 is vacuum. Shapes are given at both faces;
+    along x they follow from the rotation of the section, U = k W z from the middle.
     """
     f = checked_frequencies(frequencies)
     omega = 2 * np.pi * f
@@ -345,9 +340,7 @@ def sheet_curves(
 
 
 def _bending_wavenumbers(bending: Complex, tension: float, inertia: Floats, air: Floats) -> Complex:
-    """Propagating and evanescent roots (f, 2) of D k^5 + T k^3 - a k - b = 0, by Newton's
-    method.
-    """
+    """Propagating and evanescent roots (f, 2) of D k^5 + T k^3 - a k - b, by Newton's method."""
     D, a, b = bending[:, None], inertia[:, None], air[:, None]
     half = tension / 2 / D
     mean = np.sqrt(half**2 + a / D + 0j)

@@ -73,8 +73,8 @@ def steady_lines(
     """Compute steady-state lines of the normal displacement, by wavenumber integrals.
 
     Frequencies (f,) in Hz >= 0 and amplitudes a (f, p) in m of Re a exp(2 pi i f t) at probes
-    (p, 2) in m, for a Gaussian focus. Lines below `threshold` of the strongest line of the load are
-    left out.
+    (p, 2) in m, for a Gaussian focus. Lines weaker than `threshold` times the strongest line of the
+    load are left out.
     """
     f, amplitudes = field_lines(normal_field(compliance), pressure, probes, threshold=threshold)
     return f, amplitudes[..., 0]
@@ -83,9 +83,7 @@ def steady_lines(
 def field_lines(
     field: Field, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
-    """Frequencies (f,) in Hz and amplitudes (f, p, m) of all components of a field, as
-    `steady_lines`.
-    """
+    """Frequencies (f,) and amplitudes (f, p, m) of all components, as in `steady_lines`."""
     path, blocks = _path(field, pressure, probes, threshold)
     g = point_integrals(field, path.distances, 2 * np.pi * path.frequencies, path.width)
     return path.frequencies, np.concatenate([path.combine(g, h) for h in blocks], axis=1)
@@ -124,9 +122,7 @@ class _Path:
     coefficients: Complex
 
     def combine(self, g: Complex, harmonics: Complex) -> Complex:
-        """Amplitudes (f, p, m): c sum_cj g_cj(f) h_nmcj(x_p) of integrals g (c, f, j) and harmonics
-        h (n, m, c, j, p).
-        """
+        """Amplitudes (f, p, m) c sum_cj g_cj(f) h_nmcj of g (c, f, j) and h (n, m, c, j, p)."""
         amplitudes = np.zeros((g.shape[1], harmonics.shape[-1], harmonics.shape[1]), np.complex128)
         for order, harmonic in enumerate(harmonics):
             own = self.orders == order
@@ -163,9 +159,7 @@ def _path(
 def path_operator(
     pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> Callable[[Compliance], tuple[Floats, Complex]]:
-    """Return the function from the compliance of a body to its `steady_lines`, for many bodies
-    under a load.
-    """
+    """Return the function from the compliance of a body to its `steady_lines` under a load."""
     path, blocks = _path(NORMAL, pressure, probes, threshold)
     harmonics = np.ascontiguousarray(np.concatenate(list(blocks), axis=-1))
 
@@ -182,7 +176,7 @@ def steady_state(
 ) -> Response:
     """Compute the steady state of the normal displacement: the lines below half the sampling rate.
 
-    Takes the arguments of `flat_body`; returns a Response, displacement (t, p) in m.
+    Arguments, result and errors are those of `flat_body`.
     """
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
@@ -237,7 +231,7 @@ def flat_body(
 def field_history(
     field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
-    """All components (t, p, m) of a field from rest, as `flat_body` computes them."""
+    """All components (t, p, m) of a field from rest, as in `flat_body`."""
     width = _width(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
     within = max(1, int(np.ceil(step(times) * TRANSFORM_RATE - 1e-6)))
@@ -300,7 +294,7 @@ def _low_passed_load(
     pressure: MovingPressure, highest: float, padded: int, dt: float,
     lasting: Callable[[Floats], Floats],
 ) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
-    """The same in samples of dt, for the lines of the load below a frequency in Hz."""
+    """The same with samples of dt, for lines of the load below a frequency in Hz."""
     lines = load_lines(pressure)
     below = lines.frequencies < highest
     f, orders = lines.frequencies[below], lines.harmonics[below]
@@ -325,7 +319,7 @@ def _make_response(
 
 
 def _width(pressure: MovingPressure) -> float:
-    """Standard deviation in m of a Gaussian focal spot; a ValueError for any other load."""
+    """Standard deviation in m of a Gaussian focal spot; raises a ValueError for any other load."""
     check_lines(pressure)
     width = gaussian_width(pressure.height, pressure.profile)
     if width is None:

@@ -90,7 +90,7 @@ def quantity_field(quantity: Quantity, stack: Stack, depth: float = 0.0) -> Fiel
 
 
 def _in_motion(quantity: Quantity, field: Field, solid: Material | None = None) -> Field:
-    """A field with the rate of a quantity, and the relaxation of stress in a material."""
+    """A field with the rates of a quantity and the relaxation of stress in a material."""
 
     def answer(k: Complex, w: Complex) -> Complex:
         modulus = solid.complex_modulus(w) / solid.shear_modulus if solid else 1.0

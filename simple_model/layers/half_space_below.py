@@ -62,8 +62,8 @@ def modes_above_half_space(
     """Roots of layers on a half-space, the last layer of the stack, and depths (d,) in m of their
     shapes.
 
-    `moduli` and `slopes` (f, l) are shear moduli and their derivatives by omega. Of each frequency
-    it returns the `most` roots with most motion in the layers, NaN if there are fewer.
+    `moduli` and `slopes` (f, l) are shear moduli and their derivatives by omega. At each frequency
+    it returns the `most` roots with the most motion in the layers, NaN if there are fewer.
     """
     layers = Stack(materials=stack.materials[:-1], thicknesses=stack.thicknesses[:-1], base="free")
     terms, change = (pencil(layers, omega, x[:, :-1]) for x in (moduli, slopes))
@@ -114,7 +114,7 @@ def _candidates(
     whole: Pencil, terms: Pencil, omega: Floats, ks: Complex, most: int
 ) -> tuple[Complex, Complex]:
     """Roots (f, m) of layers on a matched layer, and their motion (f, m, 2 n) in the layers: those
-    slower than the shear wave (f, 1) below, and those with most motion in the layers.
+    slower than the shear wave (f, 1) below, and those with the most motion in the layers.
     """
     squared, V, W = eigenpairs(whole, omega)
     k = np.sqrt(squared)
@@ -211,7 +211,7 @@ def _continue_below(
 
 
 def _matrix(terms: Pencil, k: Complex, omega: Floats | None = None) -> Complex:
-    """A k^2 + B k + G (f, m, 2 n, 2 n), less w^2 M at frequencies (f,) if given."""
+    """A k^2 + B k + G (f, m, 2 n, 2 n), minus w^2 M if frequencies (f,) are given."""
     n = terms.M.shape[1]
     matrix = k[..., None, None] * _by_wavenumber(terms, k)
     matrix[..., :n, :n] -= k[..., None, None] ** 2 * terms.Auu[:, None]

@@ -98,10 +98,10 @@ def clearance(stack: Stack, w: Complex) -> float:
     """Height in 1/m above the real axis of k below which there is no pole, at frequencies w (f,).
 
     Backward waves occur from slightly below the second resonance and decay at least as fast as the
-    least of the shear waves (Tolstoy and Usdin, J Acoust Soc Am 29:37 (1957)). Evanescent waves
-    have their poles above 1 / thickness, except for the bending of a free stack, where the two
-    poles k^4 = m w^2 / D go to 0 with w. For several layers these are estimates; they were compared
-    with integrals along the real axis of 370 random stacks, and of 240 on an elastic base.
+    shear wave with the least decay (Tolstoy and Usdin, J Acoust Soc Am 29:37 (1957)). Evanescent
+    waves have their poles above 1 / thickness, except for the bending of a free stack, where the
+    two poles k^4 = m w^2 / D go to 0 with w. For several layers these are estimates; they were
+    compared with integrals along the real axis of 370 random stacks, and of 240 on an elastic base.
 
     The sum of all 1 / w_n^2 is the compliance down to the base of each part times its mass; for one
     layer it is H^2 / 2 c^2, of which the first resonance contributes (2 H / pi c)^2.
@@ -163,9 +163,7 @@ def _resonance(
 
 
 def _decay(stack: Stack, w: Complex) -> Floats:
-    """Least decay (f,) in 1/m of shear waves in a stack; `WEAKEST` of the mean if a layer
-    has none.
-    """
+    """Smallest decay (f,) in 1/m of shear waves; `WEAKEST` of the mean if a layer is lossless."""
     waves = [np.sqrt(m.density * w**2 / _shear(m, w)) for m in stack.materials]
     decay = np.abs(np.imag(waves))
     finite = [thickness for thickness in stack.thicknesses if isfinite(thickness)]
@@ -282,9 +280,7 @@ def _one_minus_exp(p: Complex, thickness: float) -> Complex:
 def _difference_quotient(
     ep: Complex, es: Complex, mean: Complex, apart: Complex, thickness: float
 ) -> Complex:
-    """(exp(-s H) - exp(-p H)) / (p - s), where p - s may be 0: mean * H tanh(x) / x with x = (p -
-    s) H / 2.
-    """
+    """(exp(-s H) - exp(-p H)) / (p - s), also for p = s: mean H tanh(x) / x, x = (p - s) H / 2."""
     if not isfinite(thickness):
         return np.zeros_like(mean)
     x2 = (apart * (thickness / 2)) ** 2

@@ -93,7 +93,7 @@ class Orthotropy:
         )
 
     def scaled(self, factor: float) -> Orthotropy:
-        """Return the same ratios with all moduli multiplied by a factor."""
+        """Return the orthotropy with all moduli multiplied by a factor."""
         shear = None if self.shear_xy is None else factor * self.shear_xy
         young_x, young_y = factor * self.young_x, factor * self.young_y
         return replace(self, young_x=young_x, young_y=young_y, shear_xy=shear)
@@ -101,7 +101,7 @@ class Orthotropy:
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """An isotropic solid; give `shear_modulus`, or use `from_young`, `of_law`, `tabulated` or
+    """An isotropic solid. Give `shear_modulus`, or use `from_young`, `of_law`, `tabulated` or
     `orthotropic`.
 
     Parameters
@@ -119,7 +119,7 @@ class Material:
         with imaginary part <= 0; `shear_modulus` is its value at rest
     orthotropy : in-plane moduli of a sheet, whose isotropic mean has `shear_modulus` and `poisson`
 
-    Raises a ValueError if a value is out of range, or a law comes with other losses or an
+    Raises a ValueError if a value is out of range, or if a law is combined with other losses or an
     orthotropy.
 
     >>> palm = Material(density=1000.0, shear_modulus=25e3, poisson=0.4999, viscosity=5.0)
@@ -184,9 +184,7 @@ class Material:
         return 2 * self.shear_modulus * self.poisson / (1 - 2 * self.poisson)
 
     def complex_modulus(self, omega: ArrayLike) -> Any:
-        """Complex shear modulus (...) in Pa for motion exp(+i w t) at w (...) in rad/s, real or
-        complex.
-        """
+        """Complex shear modulus (...) in Pa at real or complex w (...) in rad/s."""
         omega = np.asarray(omega)
         if self.law is not None:
             return self.law(omega)
@@ -199,9 +197,7 @@ class Material:
         return sum((term(omega) for term in self.prony), np.zeros((), np.complex128))
 
     def series(self, tolerance: float = FIT_TOLERANCE) -> PronySeries:
-        """Prony series of its modulus law; raises a ValueError if the law is not passive or not
-        causal.
-        """
+        """Prony series of its law; raises a ValueError if the law is not passive or not causal."""
         assert self.law is not None
         if isinstance(self.law, ModulusTable):
             return self.law.series
@@ -245,9 +241,7 @@ class Material:
 
     @property
     def plane_stress(self) -> Floats:
-        """Stiffness Q (3, 3) in Pa at equilibrium in plane stress, for the strains xx, yy
-        and 2 xy.
-        """
+        """Relaxed stiffness Q (3, 3) in Pa of plane stress, for the strains xx, yy and 2 xy."""
         if self.orthotropy is not None:
             return self.orthotropy.plane_stress
         inner = self.young / (1 - self.poisson**2)
@@ -276,7 +270,7 @@ class Material:
 
 
 def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
-    """Return a material by its Young's modulus in Pa; the other values are those of `Material`.
+    """Return a material from its Young's modulus in Pa; the other values are those of `Material`.
 
     >>> round(from_young(density=800, young=4e9, poisson=0.3).shear_modulus)
     1538461538
@@ -288,13 +282,13 @@ def orthotropic(
     *, density: float, young_x: float, young_y: float, poisson_xy: float,
     shear_xy: float | None = None, **losses: Any,
 ) -> Material:  # fmt: skip
-    """Return the material of a sheet by its moduli along x and y; its losses are isotropic.
+    """Return the material of a sheet from its moduli along x and y; losses are isotropic.
 
     Parameters
     ----------
     density : float, kg/m3
-    young_x, young_y, poisson_xy, shear_xy : as of `Orthotropy`
-    **losses : `viscosity`, `loss_factor` and `prony` as of `Material`
+    young_x, young_y, poisson_xy, shear_xy : see `Orthotropy`
+    **losses : `viscosity`, `loss_factor` and `prony` of `Material`
 
     Returns
     -------
@@ -308,7 +302,7 @@ def orthotropic(
 
 
 def of_law(*, density: float, poisson: float, law: Any) -> Material:
-    """Return a material by its density in kg/m3, Poisson's ratio and modulus law.
+    """Return a material from its density in kg/m3, Poisson's ratio and modulus law.
 
     The law is a `FractionalKelvinVoigt`, `FractionalZener` or `ModulusTable`, whose modulus at rest
     becomes that of the material.
@@ -319,7 +313,7 @@ def of_law(*, density: float, poisson: float, law: Any) -> Material:
 def tabulated(
     *, density: float, poisson: float, frequencies: ArrayLike, moduli: ArrayLike
 ) -> Material:
-    """Return a material by measured complex shear moduli.
+    """Return a material from measured complex shear moduli.
 
     Parameters
     ----------
@@ -336,6 +330,11 @@ def tabulated(
     ------
     ValueError
         As `ModulusTable` does.
+
+    >>> moduli = [25e3, 27e3 + 5e3j, 29e3 + 8e3j]
+    >>> solid = tabulated(density=1000, poisson=0.4999, frequencies=[0, 100, 200], moduli=moduli)
+    >>> solid.shear_modulus
+    25000.0
     """
     f, mu = np.asarray(frequencies, np.float64), np.asarray(moduli, np.complex128)
     table = ModulusTable(frequencies=tuple(f.tolist()), moduli=tuple(mu.tolist()))
@@ -343,7 +342,7 @@ def tabulated(
 
 
 def _tissue(shear: float, loss: float = 2e-4) -> Material:
-    """Soft tissue of a shear modulus in Pa; `loss` in s is its viscosity over that modulus."""
+    """Soft tissue with a shear modulus in Pa; `loss` in s is its viscosity over that modulus."""
     return Material(density=1000, shear_modulus=shear, poisson=0.4999, viscosity=loss * shear)
 
 

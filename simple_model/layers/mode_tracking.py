@@ -46,8 +46,8 @@ def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots
     """Sort roots at (f,) rad/s into modes, one in each column, NaN where a mode has no root.
 
     A root continues another if the trapezoidal rule of k^2, whose derivative is known, leads from
-    one to the other, and if their shapes are alike. Of all modes it returns at most `most`, the
-    least evanescent anywhere, of these the slowest, at the frequencies of indices `returned` (g,).
+    one to the other, and if their shapes are alike. The result has at most `most` modes, the least
+    evanescent ones and, if equal, the slowest, at the frequencies with indices `returned` (g,).
     """
     count = len(omega)
     index = np.full((count, 0), -1)
@@ -87,7 +87,7 @@ def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots
 
 
 def frequencies_between(roots: Roots, omega: Floats, waves: Bools, most: int) -> Floats:
-    """Frequencies (g,) in rad/s at the middle of gaps across which modes cannot be followed safely;
+    """Frequencies (g,) in rad/s in the middle of gaps across which modes cannot be followed safely;
     `waves` (f, m) marks roots that are waves.
     """
     further = []
@@ -109,9 +109,7 @@ def frequencies_between(roots: Roots, omega: Floats, waves: Bools, most: int) ->
 
 
 def merge_roots(roots: Roots, omega: Floats, other: Roots, further: Floats) -> tuple[Roots, Floats]:
-    """Merge roots at two sets (f,) and (g,) of frequencies in rad/s; return them and the
-    frequencies.
-    """
+    """Merge roots at frequencies (f,) and (g,) in rad/s; return them and their frequencies."""
     both = np.concatenate([omega, further])
     order = np.argsort(both)
     values = {

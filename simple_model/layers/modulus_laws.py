@@ -61,9 +61,7 @@ class FractionalKelvinVoigt:
         return f"fractional Kelvin-Voigt of exponent {self.exponent:g}, time {1e3 * self.time:g} ms"
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> FractionalKelvinVoigt:
-        """Return the law with its modulus multiplied by a factor, and its springpot by
-        another too.
-        """
+        """Return the law with its modulus and, separately, its springpot multiplied by factors."""
         time = self.time * loss ** (1 / self.exponent)
         return replace(self, shear_modulus=modulus * self.shear_modulus, time=time)
 
@@ -79,7 +77,7 @@ class FractionalZener:
     ----------
     shear_modulus : float, mu_0 in Pa, above 0, at rest
     fast_modulus : float, mu_inf in Pa, at least mu_0, in fast motion
-    exponent, time : as of `FractionalKelvinVoigt`
+    exponent, time : see `FractionalKelvinVoigt`
     """
 
     shear_modulus: float
@@ -133,8 +131,8 @@ def _check(law: FractionalKelvinVoigt | FractionalZener) -> None:
 class ModulusTable:
     """Measured complex shear moduli, linear between their frequencies; a modulus law.
 
-    Outside their band, and at complex frequencies, the modulus is that of a causal Prony series of
-    the table.
+    Outside this band, and at complex frequencies, a causal Prony series of the table gives the
+    modulus.
 
     Parameters
     ----------
@@ -181,7 +179,7 @@ class ModulusTable:
 
     @property
     def shear_modulus(self) -> float:
-        """Modulus in Pa at rest: at 0 Hz or, without this row, that of the series."""
+        """Modulus in Pa at rest: that at 0 Hz or, without such a row, that of the series."""
         return self.series.shear_modulus
 
     def between(self, omega: Any) -> Complex:

@@ -50,8 +50,8 @@ LOSS_FREQUENCIES = 93  # at which the series is fitted
 
 @dataclass(frozen=True, kw_only=True)
 class PronyTerm:
-    """Prony term, a Maxwell branch in parallel with the rest: `modulus` in Pa, 0 or above, and
-    relaxation `time` in s, above 0; otherwise a ValueError.
+    """Prony term, a Maxwell branch in parallel with the rest. The `modulus` in Pa is 0 or above,
+    the relaxation `time` in s above 0; other values raise a ValueError.
 
     >>> complex(PronyTerm(modulus=10e3, time=1e-3)(1000.0))  # Pa, at the peak of its loss
     (5000+5000j)
@@ -111,20 +111,20 @@ def fit_prony(
     frequencies: tuple[float, ...] = (),
     tolerance: float = FIT_TOLERANCE,
 ) -> PronySeries:
-    """Fit the Prony series with the fewest terms that is within a tolerance of a modulus law over a
+    """Fit a Prony series to a modulus law: the one with the fewest terms within a tolerance over a
     band.
 
     Parameters
     ----------
     law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa
     band : lowest and highest frequency in Hz
-    rest : float, Pa, the modulus at rest; fitted if not given
-    frequencies : Hz, within the band, that are fitted in addition to log-spaced ones
+    rest : float, Pa, modulus at rest; fitted if not given
+    frequencies : Hz, within the band, fitted in addition to log-spaced ones
     tolerance : float, largest relative deviation |series - law| / |law|
 
     Returns
     -------
-    PronySeries; for a noisy law the shortest that is almost as near as any
+    PronySeries; for a noisy law the shortest of almost equally close ones
 
     Raises
     ------
@@ -153,8 +153,8 @@ def fit_prony(
 
 
 def check_modulus(frequencies: Floats, moduli: Complex) -> None:
-    """Refuse complex moduli (f,) in Pa at ascending frequencies (f,) in Hz that are not those of a
-    passive, causal solid. Causal moduli are near some series of non-negative terms (`CAUSAL`).
+    """Refuse complex moduli (f,) in Pa at ascending frequencies (f,) in Hz unless they are passive
+    and causal. Causal moduli are close to a series of non-negative terms (`CAUSAL`).
     """
     check_passive(frequencies, moduli)
     w = 2 * np.pi * frequencies
@@ -171,7 +171,7 @@ def check_modulus(frequencies: Floats, moduli: Complex) -> None:
 
 
 def check_passive(frequencies: Floats, moduli: Complex) -> None:
-    """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz of a solid that is not passive."""
+    """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz that are not passive."""
     limits = (
         (~np.isfinite(moduli), "modulus", np.real, "must be finite"),
         (moduli.real <= 0, "storage modulus", np.real, "must be above 0"),
@@ -218,8 +218,8 @@ def fitted_series(
 
 @lru_cache(maxsize=1024)
 def constant_loss(loss_factor: float) -> PronySeries:
-    """Return the modulus of a nearly constant loss factor above 0, relative to the storage modulus
-    at `REFERENCE`.
+    """Return the modulus law of a nearly constant loss factor above 0, relative to the storage
+    modulus at `REFERENCE`.
 
     A modulus mu (1 + i eta) with one eta at all frequencies is not causal. The solid of constant
     loss factor eta has the modulus

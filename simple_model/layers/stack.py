@@ -15,12 +15,12 @@ class Stack:
 
     Parameters
     ----------
-    materials : of each layer
-    thicknesses : m, of each layer, above 0; the last may be inf, a half-space
+    materials : one for each layer
+    thicknesses : m, one for each layer, above 0; the last may be inf, a half-space
     base : below the last layer if it is finite: "clamped", "free" or "elastic" (Winkler foundation)
     base_stiffness : N/m3, traction per displacement of an elastic base, in every direction
 
-    Raises a ValueError if there is no layer, or a value is out of range.
+    Raises a ValueError if there is no layer or a value is out of range.
 
     >>> from simple_model.layers.material import PRESETS
     >>> skin = Stack(materials=(PRESETS["dermis"], PRESETS["fat"]), thicknesses=(0.002, inf))
@@ -62,7 +62,7 @@ class Stack:
 
     @property
     def is_rigid(self) -> bool:
-        """Whether it ends on a rigid base or a half-space."""
+        """Whether it ends in a rigid base or a half-space."""
         return self.base == "clamped" or self.is_half_space
 
     @property

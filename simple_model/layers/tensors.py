@@ -28,9 +28,7 @@ def energy_root(material: Material) -> Floats:
 
 
 def largest_shear(strain: Floats) -> Floats:
-    """Largest shear strain (...) of strains (..., 6): engineering strain, e_1 - e_3 of the
-    principal strains.
-    """
+    """Largest engineering shear strain (...) of strains (..., 6), e_1 - e_3."""
     principal = np.linalg.eigvalsh(_matrices(strain))
     return np.asarray(principal[..., 2] - principal[..., 0])
 

@@ -8,8 +8,8 @@ U, W' and i (U' - k W). Its weak form over the depth z is the symmetric quadrati
 with A, G, M block diagonal in (U, W) and B off-diagonal (E. Kausel, Int J Numer Meth Eng 37:927
 (1994)). With V = k U it is linear in k^2, and half as large as its companion form. The elements in
 depth are of order `ORDER` with Gauss-Lobatto nodes, which make M and the shear-modulus terms of A
-diagonal. The terms of the first Lame parameter have one Gauss point fewer than nodes: with as many,
-each element would have a spurious wave of pure pressure near nu = 0.5.
+diagonal. The terms of the first Lame parameter use one Gauss point fewer than there are nodes: with
+equal numbers, each element would have a spurious pressure wave near nu = 0.5.
 
 A half-space below is a perfectly matched layer: elements of complex length, in which outgoing waves
 decay.
@@ -52,9 +52,7 @@ class Pencil:
 
 @cache
 def lobatto() -> tuple[Floats, Floats, Floats]:
-    """Nodes (9,) and weights (9,) of Gauss-Lobatto quadrature on 0 to 1, and derivatives (q, a) of
-    shape functions.
-    """
+    """Gauss-Lobatto nodes (9,), weights (9,) on 0 to 1, and shape function derivatives (q, a)."""
     top = legendre.Legendre.basis(ORDER)
     x = np.concatenate([[-1.0], np.sort(top.deriv().roots().real), [1.0]])
     weights = np.array(2 / (ORDER * (ORDER + 1) * top(x) ** 2), np.float64)
@@ -67,9 +65,7 @@ def lobatto() -> tuple[Floats, Floats, Floats]:
 
 @cache
 def gauss() -> tuple[Floats, Floats, Floats]:
-    """Weights (8,) of Gauss quadrature on 0 to 1, and shape functions (q, a) and their
-    derivatives.
-    """
+    """Gauss weights (8,) on 0 to 1, shape functions (q, a) and their derivatives (q, a)."""
     nodes, _, D = lobatto()
     x, weights = legendre.leggauss(ORDER)
     basis = [legendre.legvander(at, ORDER) for at in (x, 2 * nodes - 1)]
@@ -78,9 +74,7 @@ def gauss() -> tuple[Floats, Floats, Floats]:
 
 
 def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
-    """Layer of each element, and the lengths (f, e) of elements in m; a ValueError if there are too
-    many.
-    """
+    """Return the layer of each element, and lengths (f, e) in m; raise a ValueError if too many."""
     layers, lengths = [], []
     finite = sum(thickness for thickness in stack.thicknesses if np.isfinite(thickness))
     for k, (material, thickness) in enumerate(zip(stack.materials, stack.thicknesses, strict=True)):

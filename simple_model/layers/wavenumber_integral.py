@@ -50,7 +50,7 @@ class Field:
     ----------
     answer : (k (k,) in 1/m, w (f, 1) in rad/s) -> (c, f, k), per pressure
     orders : (c,) order n of each integral
-    clearance : as of `Compliance`
+    clearance : see `Compliance`
     weights : horizontal offsets (..., 2) in m from the focus -> (m, c, ...); components are sums
         over c of weights times integrals
     """
@@ -104,7 +104,7 @@ def point_integrals(
     distances : (r,) float, m
     frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
     width : m, standard deviation of the spot
-    negligible : for ascending frequencies: integration ends after the batch in which each integral
+    negligible : integration over ascending frequencies ends after the batch in which each integral
         is below this fraction of its largest value
 
     Raises an ArithmeticError if the wavenumber grid cannot be made fine enough.
@@ -150,7 +150,7 @@ def _lift(field: Field, r: Floats, w: Complex, width: float) -> float:
 
 
 def _resolve(field: Field, w: Complex, grid: Callable[[int], _Grid], n: int) -> tuple[int, Complex]:
-    """Double the number of wavenumbers, from n, until the integrals do not change. Return both."""
+    """Double the number of wavenumbers, from n, until the integrals converge. Return both."""
     some = w[:: -(-len(w) // COMPARED)] if _is_damped(w) else w
     coarse = _integrate(field, some, grid(n))
     while n < MOST_NODES:
@@ -169,7 +169,7 @@ def _batch(field: Field, w: Complex, grid: _Grid) -> Complex:
 
 
 def _is_damped(w: Complex) -> bool:
-    """Whether frequencies are many on a line below the real axis, as for a transient."""
+    """Whether there are many frequencies on a line below the real axis, as for a transient."""
     return bool(len(w) > 4 * FEWEST_INTERVALS and w.imag.max() < 0 and np.ptp(w.imag) == 0)
 
 

@@ -25,10 +25,10 @@ class DriveLaw:
     ----------
     name : str, for messages, pages and, if it is registered in `DRIVES`, scene files
     pressure : amplitude (...), modulation (...), depth -> pressure (...) relative to full drive
-    degree : int, as a polynomial of the modulation; None if it is not a polynomial
-    words, note : str, a few words for a choice on a page, and a sentence about its lines under AM
+    degree : int, of the polynomial of the modulation; None if it is not a polynomial
+    words, note : str, a few words for menus, and a sentence about its lines under AM
 
-    Raises a ValueError if the law is not a polynomial of its degree in the modulation.
+    Raises a ValueError if the pressure is not a polynomial of this degree.
 
     >>> import numpy as np
     >>> law = DriveLaw(name="cubic", degree=3, pressure=lambda A, M, m: (A * (1 + m * M) / 2) ** 3)
@@ -108,5 +108,5 @@ DRIVES = {
 
 
 def usual_drive(drive: str | DriveLaw, usual: str | DriveLaw) -> str | DriveLaw:
-    """Return the drive law, but `usual` in place of the published one."""
+    """Return a drive law, with `usual` in place of the published one."""
     return usual if drive == PUBLISHED else drive

@@ -49,7 +49,7 @@ _FORCES = np.array(
 class ContactSpot:
     """Gaussian traction of a small contact of standard deviation `width` in m.
 
-    It is the same at all heights. A width outside `CONTACT_WIDTHS` raises a ValueError.
+    It does not depend on the height. A width outside `CONTACT_WIDTHS` raises a ValueError.
     """
 
     width: float
@@ -115,7 +115,7 @@ def focal_spot(
     Parameters
     ----------
     offsets : (..., 2) float, m from the focus
-    height : m, of the focus above the array
+    height : float, m, of the focus above the array
     profile : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; "array", the
         field of the array with its side lobes, to 60 mm along each axis; or a function of the
         offsets

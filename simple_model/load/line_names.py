@@ -83,7 +83,7 @@ def named_lines(
     pressure : MovingPressure
     threshold : fraction of the strongest line, 0 to 1; weaker lines are left out
     most : largest number of lines, the strongest
-    candidates : names of lines that are always listed
+    candidates : names of lines that are listed in any case
 
     Returns
     -------
@@ -106,7 +106,7 @@ def line_names(
     most: int = MOST,
     candidates: Iterable[str] = (),
 ) -> LineNames:
-    """Return the lines above a fraction of the strongest on the path, without the mean.
+    """Return the lines above a fraction of the strongest one on the path, without the mean.
 
     Candidates are added if the Tacton has their tones and they do not coincide with a listed line.
     A recording that runs only once has no f_d, and a rhythm or signal that does not repeat has no
@@ -135,7 +135,7 @@ def line_frequency(tacton: Tacton, name: str) -> float | None:
 
 
 def symbols(tacton: Tacton) -> Floats:
-    """Frequencies (6,) in Hz of `SYMBOLS`; 0 for those that a Tacton does not repeat."""
+    """Frequencies (6,) in Hz of `SYMBOLS`; 0 for those that a Tacton does not have or repeat."""
     w1, w2 = tacton.superposition
     f_1, f_2, f_e = tones(tacton)
     signal, rhythm = tacton.signal, tacton.rhythm
@@ -166,7 +166,7 @@ def line_name(orders: Sequence[int], of_tacton: Floats) -> str:
 
 
 def _orders(name: str) -> Ints:
-    """Orders (6,) of `SYMBOLS` in a name; raises a ValueError if it is not a sum of them."""
+    """Orders (6,) of `SYMBOLS` in a name; raises a ValueError for other names."""
     orders = np.zeros(len(SYMBOLS), int)
     terms = re.findall(r"([+-]?)(\d*)(f_[A-Za-z0-9]+)", name)
     if "".join(map("".join, terms)) != name or any(term[2] not in SYMBOLS for term in terms):
@@ -261,7 +261,7 @@ def _fourier(values: Floats) -> Complex:
 
 
 def _strongest(c: Floats, threshold: float) -> tuple[tuple[Ints, Ints], Floats]:
-    """Indices and values (k,) of the entries above a fraction of the largest, not too many."""
+    """Indices and values (k,) of the entries above a fraction of the largest, limited in number."""
     least = threshold * c.max(initial=0.0)
     if c.size > MOST_PRODUCTS:
         least = max(least, np.partition(c.ravel(), -MOST_PRODUCTS)[-MOST_PRODUCTS])

@@ -43,8 +43,8 @@ class PathCells:
 
     Cell by cell, the load is the matrix `cells` (k, q) times the effect of a focus of unit pressure
     at `positions` (q, 2) in m. It is one focus of unit pressure that runs once along the path or,
-    if `of_tacton`, the whole load in Pa: with a rhythm or a signal, or if the Tacton is too short
-    for a path that jumps.
+    if `of_tacton`, the whole load in Pa: if there is a rhythm or a signal, or if the Tacton is too
+    short for a path that jumps.
     """
 
     positions: Floats
@@ -129,7 +129,7 @@ def path_samples(pressure: MovingPressure) -> Floats:
 def path_fourier(
     pressure: MovingPressure, values: Floats | Complex, orders: Ints | None = None
 ) -> Complex:
-    """Fourier coefficients (..., n) of the effect of a load, of given orders (n,) or of all.
+    """Fourier coefficients (..., n) of the effect of a load, for given orders (n,) or all.
 
     `values` (..., q) are the effects of a focus of unit pressure at each of `path_samples`. Index
     -n is harmonic -n.
@@ -174,8 +174,7 @@ def cells(jumps: Floats, start: float, width: float, count: int) -> tuple[Floats
 def jump_phases(pressure: MovingPressure) -> Floats:
     """Fractions (j,) of the period at which a focus jumps in position or level.
 
-    Moves that are shorter than a cell count as jumps at their ends, and with a heading, so do
-    turns.
+    Moves shorter than a cell count as jumps at their ends; with a heading, turns count too.
     """
     path = pressure.tacton.trajectory
     bounds, lengths = path.parts
@@ -266,9 +265,7 @@ def without_sampled_parts(pressure: MovingPressure) -> MovingPressure:
 
 
 def highest_passing(pressure: MovingPressure) -> float:
-    """Highest line in Hz, above 1e-7 of all, that the moving focus makes anywhere; at most
-    `HIGHEST` for a recording.
-    """
+    """Highest line in Hz, above 1e-7 of all, of a moving focus; at most `HIGHEST` if recorded."""
     highest = (
         PASSING_LIMIT * _top_speed(pressure.tacton) / spot_detail(pressure.height, pressure.profile)
     )

@@ -50,11 +50,11 @@ class MovingPressure:
         uncertain by a factor of 2, is the radiation pressure of a 160 dB focus on a wall that
         reflects fully.
     height : float, m, of the focus above the array
-    heading : "x" or "y" multiplies the pressure by that component of the unit tangent of the path,
-        as for a traction along the path; "" does not
+    heading : "x" or "y" multiplies the pressure by this component of the unit tangent of the path,
+        for a traction along the path; "" for none
 
-    Raises a ValueError if a value is unknown, not finite or out of range, or a path without a
-    tangent has a heading.
+    Raises a ValueError if a value is unknown, not finite or out of range, or if there is a heading
+    but the path has no tangent.
 
     >>> from simple_model import Tacton
     >>> load = MovingPressure(tacton=Tacton(am_frequency=140.0), drive="linear")
@@ -137,7 +137,8 @@ class MovingPressure:
     def gain(self, t: ArrayLike, over: float = 0.0) -> Floats:
         """Pressure (...) in Pa at each focus at times (...) in s, without the level of the path.
 
-        Rhythms and signals are averaged over a time `over` in s about each time, from the start on.
+        Rhythms and signals are averaged over a time `over` in s about each time, but not before the
+        start.
         """
         if over and self.tacton.is_sampled:
             parts = ((np.arange(SAMPLES_PER_AVERAGE) + 0.5) / SAMPLES_PER_AVERAGE - 0.5) * over
@@ -165,7 +166,7 @@ class MovingPressure:
 
 
 def check_lines(pressure: MovingPressure) -> None:
-    """Refuse subclasses of `MovingPressure`: models of lines use its formulas only."""
+    """Refuse subclasses of `MovingPressure`, because models of lines use only its formulas."""
     if type(pressure) is not MovingPressure:
         raise ValueError(
             f"the load {type(pressure).__name__} is a subclass of MovingPressure, and only "

@@ -34,7 +34,7 @@ class Rhythm:
     pulses : (n, 2), s: duration of each pulse, above 0, and the gap after it, 0 or above
     ramp : float, s, linear rise at the start and fall at the end of each pulse, within the pulse
 
-    Raises a ValueError if there is no pulse, or a value is not finite or out of range.
+    Raises a ValueError if there is no pulse or a value is not finite or out of range.
 
     >>> rhythm = Rhythm(pulses=((0.05, 0.03),))  # 50 ms on, 30 ms off
     >>> rhythm.level([0.0, 0.06, 0.09])
@@ -98,7 +98,7 @@ class Signal:
     Parameters
     ----------
     rate : float, Hz, samples per second
-    samples : (k,) of the modulation, -1 to 1, or of the amplitude, 0 to 1
+    samples : (k,) float, -1 to 1 for a modulation, 0 to 1 for an envelope
     role : "modulation" multiplies the AM sinusoids; "envelope" multiplies the amplitude, as a
         rhythm does
 
@@ -130,5 +130,5 @@ class Signal:
 
     @cached_property
     def _round(self) -> Floats:
-        """The samples and the first of them again."""
+        """The samples, followed by the first one."""
         return np.append(self._values, self._values[0])

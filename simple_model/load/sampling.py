@@ -38,7 +38,7 @@ def _highest_order(pressure: MovingPressure) -> int:
 
 
 def highest_line(pressure: MovingPressure) -> float:
-    """Highest line in Hz of a load at any place; 0, for unknown, if it is not a `MovingPressure`.
+    """Highest line in Hz of a load at any place; 0, unknown, for a load of another type.
 
     Rhythms are averaged over a sample and do not count; a signal counts with half its rate.
     """
@@ -75,9 +75,7 @@ def is_folded(pressure: MovingPressure, times: Floats) -> bool:
 
 
 def highest_driving(pressure: MovingPressure, times: Floats) -> float:
-    """Frequency in Hz up to which lines of a load move a body that is sampled at times
-    (t,) in s.
-    """
+    """Highest frequency in Hz at which a load moves a body that is sampled at times (t,) in s."""
     return 0.5 / step(times) if is_folded(pressure, times) else np.inf
 
 

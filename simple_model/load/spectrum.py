@@ -3,7 +3,7 @@
     q(x, t) = Q(t) sum_j S(x - X(f_d t + a_j))
     Q = sum_m c_m exp(2 pi i f_m t),  S = sum_n s_n(x) exp(2 pi i n f_d t)
 
-A line at f = f_m + n f_d has the pattern c_m s_n(x) sum_j exp(2 pi i n a_j). Of n foci at even
+A line at f = f_m + n f_d has the pattern c_m s_n(x) sum_j exp(2 pi i n a_j). With n foci at even
 phases, only every n-th harmonic of the path remains.
 
 With a rhythm or a signal, Q is more than a few sinusoids, and a path that jumps may be longer than
@@ -65,8 +65,8 @@ class LoadSpectrum:
 
 
 def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectrum:
-    """Return the lines that exceed a fraction of the strongest line on the path; the mean for a
-    zero load.
+    """Return the lines that exceed a fraction of the strongest line on the path; for a zero load,
+    the mean.
 
     >>> from simple_model import Tacton
     >>> load = MovingPressure(tacton=Tacton(am_frequency=140.0), drive="pressure_squared")
@@ -151,8 +151,8 @@ def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[Ints, Fl
     """Orders (n,) of the harmonics of `path_cells` that matter, and their amplitudes (n,) on the
     path.
 
-    Those that exceed a fraction of the strongest, with all foci, and order 0; amplitudes are the
-    largest at about eight points of the path.
+    These are order 0 and all that exceed a fraction of the strongest, with all foci. Amplitudes are
+    the largest at about eight points of the path.
     """
     of_spot, n = _largest_harmonics(pressure), harmonics(pressure)
     share = np.abs(foci_harmonics(pressure, n)) * of_spot[n]
@@ -170,9 +170,7 @@ def _largest_harmonics(pressure: MovingPressure) -> Floats:
 
 
 def foci_harmonics(pressure: MovingPressure, n: Ints) -> Complex:
-    """Array factor (k,) of all foci for harmonics n (k,) of one focus; 1 if the cells are of the
-    Tacton.
-    """
+    """Array factor (k,) of all foci for harmonics n (k,) of one; 1 for cells of the Tacton."""
     if path_cells(pressure).of_tacton:
         return np.ones(len(n), np.complex128)
     return np.asarray(np.exp(2j * np.pi * n[:, None] * pressure.tacton.foci).sum(axis=1))
@@ -204,8 +202,8 @@ def gain_orders(
     """Fourier orders (m, 3) of f_AM, f_AM2 and f_e in the gain, and coefficients (k, m) in Pa.
 
     The modulation is multiplied by each of `factors` (k,). For a drive law that is not a
-    polynomial, phases are doubled until its harmonics fall below `ALIASED`; a ValueError if
-    `MOST_PHASES` do not suffice.
+    polynomial, the number of phases is doubled until its harmonics fall below `ALIASED`. Raises a
+    ValueError if `MOST_PHASES` are not enough.
     """
     law, n_tones = pressure.law, np.count_nonzero(tones(pressure.tacton))
     count = PHASES if law.degree is None else max(PHASES, 2 * law.degree + 2)

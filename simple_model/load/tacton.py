@@ -36,7 +36,7 @@ class Tacton:
 
     Parameters
     ----------
-    amplitude : float, 0 to 1, of the full drive of the device
+    amplitude : float, 0 to 1, share of the full drive of the device
     am_frequency, second_am_frequency : float, Hz, 0 = off
     superposition : (w1, w2), weights >= 0 of the two AM sinusoids, sum 1
     envelope_frequency : float, Hz, 0 = constant
@@ -50,8 +50,8 @@ class Tacton:
     rhythm : Rhythm or None
     signal : Signal or None
 
-    Raises a ValueError if a value is not finite or out of range, or a path with levels of its own
-    comes with a rhythm or a signal.
+    Raises a ValueError if a value is not finite or out of range, or if a path with levels is
+    combined with a rhythm or a signal.
 
     >>> circle = Trajectory(shape="circle", size=0.02, speed=12.0)
     >>> tacton = Tacton(am_frequency=140.0, duration=0.5, trajectory=circle)
@@ -148,21 +148,21 @@ def modulation_at_phases(tacton: Tacton, first: Floats, second: Floats, envelope
 
 
 def tones(tacton: Tacton) -> tuple[float, float, float]:
-    """Frequencies in Hz of the two AM sinusoids and the envelope; 0 for one that is off."""
+    """Frequencies in Hz of the two AM sinusoids and the envelope; 0 if off."""
     return tacton.am_frequency, tacton.second_am_frequency, tacton.envelope_frequency
 
 
 def commanded_signal(tacton: Tacton, t: ArrayLike) -> Floats:
     """Commanded signal p(t) of equation 1 at times (...) in s, with its carrier, over full drive.
 
-    It excludes the levels of a recorded path: each focus has its own.
+    It excludes the levels of a recorded path, which differ between foci.
     """
     carrier = np.sin(2 * np.pi * CARRIER * np.asarray(t, np.float64))
     return tacton.amplitude * level(tacton, t) * carrier * modulation(tacton, t)
 
 
 def repetition_frequencies(tacton: Tacton) -> dict[str, float]:
-    """Frequencies in Hz, by name, of all parts of a Tacton that repeat; f_d is that of all foci."""
+    """Frequencies in Hz of all repeating parts of a Tacton, by name; f_d is that of all foci."""
     w1, w2 = tacton.superposition
     signal = tacton.signal
     frequencies = {
@@ -180,10 +180,10 @@ def pattern_period(tacton: Tacton) -> float:
     """Return the period in s of the whole pattern.
 
     It is the shortest time, at most the duration, after which AM, envelope, foci, rhythm and signal
-    repeat together. For incommensurate frequencies it is the shortest time, at least the period of
-    the slowest beat between them, after which every phase returns within 1 % of a turn, or the time
-    of the closest return: 78.5 ms for f_d = 190.986 Hz with f_AM = 140 Hz. If nothing repeats, it
-    is the duration.
+    repeat together. Incommensurate frequencies do not repeat exactly: then every phase returns
+    within 1 % of a turn, or as closely as possible, after no less than the period of their slowest
+    beat. For f_d = 190.986 Hz and f_AM = 140 Hz this takes 78.5 ms. If nothing repeats, it is the
+    duration.
 
     >>> round(pattern_period(Tacton(am_frequency=100.0, envelope_frequency=40.0)), 6)
     0.05

@@ -55,9 +55,9 @@ class Trajectory:
     centre : (x, y), m, added to all positions
     points : (k, 2), m, corners of a polyline or positions of a recording. A polyline is closed if
         its last corner equals its first.
-    times : (k,), s, start at 0 and never fall: when a recording is at its points. Its period is
-        times[-1]. Equal times make a jump.
-    levels : (k,), 0 to 1, factors of the amplitude at those times; 1 throughout if empty
+    times : (k,), s, at which a recording is at its points; they start at 0 and never fall. The
+        period is times[-1]. Equal times make a jump.
+    levels : (k,), 0 to 1, factors of the amplitude at these times; all 1 if empty
     hold : bool, whether a recording stays at a point until the next time, as devices do, or moves
         there in a straight line
 
@@ -154,9 +154,7 @@ class Trajectory:
 
     @cached_property
     def parts(self) -> tuple[Floats, Floats]:
-        """Bounds (s + 1,) of the smooth parts, as fractions of the period from 0 to 1, and their
-        lengths (s,) in m.
-        """
+        """Bounds (s + 1,) of the smooth parts, as phases, and their lengths (s,) in m."""
         if self.shape == "recorded":
             clock = self._clock
             bounds = np.unique(clock) / clock[-1]
@@ -198,7 +196,7 @@ class Trajectory:
 
     @property
     def _nearby(self) -> float:
-        """Fraction of the period that separates two times, but in which nothing moves."""
+        """Fraction of the period between distinct times in which nothing moves."""
         return 2 * JUST_AFTER / max(1, len(self.points) - 1)
 
     def _about_origin(self, phase: Floats) -> Floats:
@@ -259,9 +257,9 @@ def differ(before: Floats, after: Floats) -> Bools:
 def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
     """Join the paths of several foci into one recording, which the foci share.
 
-    The recording runs the n paths one after the other: with each drawn in a time T, its period is n
-    T. Use `even_phases(n)` as foci. Each path then has one focus at all times. A circle of diameter
-    d becomes a polygon, within d/2 (1 - cos(pi / 132)) of it.
+    The recording runs through the n paths in turn. If each takes a time T, the period is n T. With
+    `even_phases(n)` as foci, each path has one focus at all times. A circle of diameter d becomes a
+    polygon, within d/2 (1 - cos(pi / 132)) of it.
 
     Parameters
     ----------

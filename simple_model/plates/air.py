@@ -1,6 +1,6 @@
 """Added mass of the air on both sides of a rectangular plate in a baffle, for Ritz's method.
 
-For bending waves much slower than sound the air is incompressible. Its mass per area at the
+For bending waves much slower than sound the air is incompressible. Its mass per area at a
 wavenumber k is 2 rho / k (Junger and Feit, Sound, Structures, and Their Interaction (1986), 5.11).
 With
 
@@ -11,7 +11,7 @@ rule in log t converges exponentially. The integrands are transforms of Legendre
 (-i)^n j_n(k a / 2).
 
 Without a baffle air flows around the edges, and the mass is too large within about 1/k of them: by
-a factor of 2 for a rigid disc, by little for a mode with many half waves.
+a factor of 2 for a rigid disc, slightly for a mode with many half waves.
 """
 
 import numpy as np
@@ -27,9 +27,7 @@ DECAYED = 6.0  # exp(-36) is negligible
 
 
 def air_mass(x: LineBasis, y: LineBasis, density: float) -> Floats:
-    """Added mass (x y, x y) in kg/m2, y faster, of each pair of products of functions; density in
-    kg/m3.
-    """
+    """Added mass (x y, x y) in kg/m2, y fastest, of products of functions; density in kg/m3."""
     highest = max(2 * line.legendre[..., 0].size / line.length for line in (x, y))
     nearest, farthest = NEAREST / highest, FARTHEST * max(x.length, y.length)
     distances = np.exp(np.arange(np.log(nearest), np.log(farthest), STEP))

@@ -25,8 +25,8 @@ STIFFER = 1.0001
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeModes:
-    """Poles (m, j) in 1/s of m modes, and `residues` (m, j) in s of their compliances. Of conjugate
-    poles only one has a residue, the whole one; real poles have half.
+    """Poles (m, j) in 1/s of m modes, and `residues` (m, j) in s of their compliances. Only one of
+    two conjugate poles has a residue, that of both; real poles have half of theirs.
     """
 
     poles: Complex
@@ -82,16 +82,14 @@ WITHOUT_LOSS = Loss(rest=1.0, lag=0.0, shares=np.zeros(0), times=np.ones(0))
 
 
 def free_modes(modes: PlateModes, material: Material) -> FreeModes:
-    """Poles and residues of the modes of a plate, for a material without a modulus law of
-    its own.
-    """
+    """Poles and residues of the modes of a plate whose material has no modulus law."""
     squared = np.maximum(modes.squared, np.finfo(float).tiny)
     bent = squared * modes.elastic
     return free_vibration(*relaxing_stiffness(squared - bent, bent, material))
 
 
 def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tuple[Floats, Floats]:
-    """Stiffness (m, 2 + n) of modes and times (n,) in s, for `free_vibration`, of a material with
+    """Stiffness (m, 2 + n) of modes and times (n,) in s, for `free_vibration`, from a material with
     Maxwell branches.
 
     `lossless` (m,) and `bent` (m,) in 1/s2 are the parts of the squared frequencies without loss

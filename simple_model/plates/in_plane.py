@@ -79,8 +79,8 @@ class InPlane:
 
     @staticmethod
     def of(plate: Plate, A: Floats, grid: Grid, odd: tuple[int, int], in_plane: str) -> InPlane:
-        """The problem of a plate of stiffness A (3, 3) in N/m, with edges as in `IN_PLANE`, for
-        strains xx that are `odd` along x and along y, if functions are split.
+        """The problem of a plate with stiffness A (3, 3) in N/m and edges as in `IN_PLANE`. If
+        functions are split, `odd` states the symmetry of the strain xx along x and y.
         """
         u, v = (
             tuple(
@@ -102,7 +102,7 @@ class InPlane:
         return InPlane(A=A, grid=grid, u=(u[0], u[1]), v=(v[0], v[1]), free=free, factor=factor)
 
     def incompatible(self, strains: Floats) -> Floats:
-        """Strains (3, p, x, y) less those of the in-plane displacement that relieves them."""
+        """Strains (3, p, x, y) minus those of the in-plane displacement that relieves them."""
         if not len(self.free):
             return strains
         xx, yy, xy = np.tensordot(self.A, strains, axes=1) * self.grid.areas
@@ -122,9 +122,7 @@ class InPlane:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Line:
-    """Functions along x or y, their values and slopes (points, i) on the grid, and its weights
-    (points,).
-    """
+    """Functions along x or y: values and slopes (points, i) on the grid; its weights (points,)."""
 
     basis: LineBasis
     values: Floats

@@ -66,7 +66,7 @@ def linear_motion(
 
     The material has the `shear_modulus` of the modes and no modulus law of its own; times (t,) in s
     are 0 or above; `middle` (2,) in m is that of the plate in the scene. Returns the modes of
-    indices `chosen` (r,), by default all. Lines of the load from `highest` Hz on are left out.
+    indices `chosen` (r,), by default all. Lines of the load at or above `highest` Hz are left out.
     """
 
     def modulus(omega: Floats) -> Floats:
@@ -92,8 +92,8 @@ def linear_motion(
 def stretched_motion(
     plate: KarmanPlate, linear: Floats, dt: float, material: Material | None = None
 ) -> Motion:
-    """Motion from rest, at 0, dt, ..., (n - 1) dt in s. The load is the one that moves the plate by
-    `linear` (n, r) in kg^1/2 m, as of `linear_motion` of the chosen modes, if it does not stretch.
+    """Motion from rest, at 0, dt, ..., (n - 1) dt in s. Without stretching, the load would move the
+    plate by `linear` (n, r) in kg^1/2 m, the `linear_motion` of the chosen modes.
     """
     forces = _Scheme.of(plate, dt, material).forces(linear)
     return forced_motion(plate, forces, dt, material)
@@ -110,8 +110,8 @@ def forced_motion(
     """Motion at the n + 1 times 0, dt, ..., n dt under forces (n, r) in N kg^-1/2 on the chosen
     modes.
 
-    It starts from `start` (2, r), coordinates in kg^1/2 m and their rates, or from rest, and has no
-    loss if no material is given. Raises an ArithmeticError if a step is not finite.
+    It starts from `start` (2, r), coordinates in kg^1/2 m and their rates, or from rest. Without a
+    material it has no loss. Raises an ArithmeticError if a step is not finite.
     """
     scheme = _Scheme.of(plate, dt, material)
     M, K, B, rest = scheme.mass, scheme.K, scheme.bending, scheme.rest

@@ -56,13 +56,13 @@ class Plate:
     d11, d22, d12, d66 : N m, bending stiffnesses; of an isotropic plate D, D, nu D, (1 - nu) D / 2
     mass_per_area : kg/m2
     tension_x, tension_y : N/m, uniform
-    left, right, front, back : "clamped", "simply" or "free", the edges at least and greatest x and
+    left, right, front, back : "clamped", "simply" or "free", edges at smallest and largest x, then
         y
     clips : ((x, y), ...) m, where the plate is fixed
     clip_radius : m, half a side of the fixed square; 0 fixes the deflection of a point only
     air_density : kg/m3, 0 in vacuum
 
-    Raises a ValueError if a value is out of range, or a clip is off the plate.
+    Raises a ValueError if a value is out of range or a clip is off the plate.
     """
 
     size_x: float
@@ -166,8 +166,8 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
     """Compute all modes of a plate that polynomials up to the wavenumber `finest` in rad/m
     represent.
 
-    `finest` may differ along x and y. The lowest modes are accurate, the highest only complete the
-    static deflection. More than `MOST_DOFS` degrees of freedom raise a ValueError.
+    `finest` may differ along x and y. The lowest modes are accurate; the highest only complete the
+    static deflection. Raises a ValueError for more than `MOST_DOFS` degrees of freedom.
 
     >>> stiffness = {"d11": 4e-4, "d22": 4e-4, "d12": 1.2e-4, "d66": 1.4e-4}
     >>> plate = Plate(size_x=0.1, size_y=0.1, mass_per_area=0.08, **stiffness)
@@ -210,7 +210,7 @@ def modal_motion(
 def modal_motion_apart(
     modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
 ) -> Complex:
-    """Modal coordinates (f, m) as of `modal_motion`, without the coupling of the modes."""
+    """Modal coordinates (f, m) as in `modal_motion`, without coupling between modes."""
     w = 2 * np.pi * np.asarray(frequencies)[:, None]
     bending = modulus(w) * modes.elastic
     coordinates = forces / (modes.squared * (1 - modes.elastic + bending) - w**2)
@@ -275,9 +275,7 @@ def _symmetries(plate: Plate) -> tuple[bool, bool]:
 
 
 def _line_bases(plate: Plate, axis: int, finest: float, mirrored: bool) -> tuple[LineBasis, ...]:
-    """Functions along x or y that resolve a wavenumber in rad/m, on pieces between the sides of
-    clips.
-    """
+    """Functions along x or y up to a wavenumber in rad/m, on pieces between sides of clips."""
     size = (plate.size_x, plate.size_y)[axis]
     ends = ((plate.left, plate.right), (plate.front, plate.back))[axis]
     if not (inner := _breaks(plate, axis, size)):
@@ -299,7 +297,9 @@ def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
 
 
 def _apart(first: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
-    """Places, and those of others that are farther than a gap from them and from both ends."""
+    """Places, and those of the others that are more than a gap away from them and from both
+    ends.
+    """
     places = [-end, *first, end]
     for place in sorted(others, key=abs):
         if abs(place) < end and all(abs(place - each) > gap for each in places):
@@ -328,8 +328,8 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
 
 def _modes(K: Floats, M: Floats) -> tuple[Floats, Floats]:
     """Squared angular frequencies (m,) in rad2/s2 and shapes (n, m) of unit modal mass, ascending.
-    Solves M x = K x / w^2, as the error goes with the largest eigenvalue; a shift allows rigid
-    motion.
+    Solves M x = K x / w^2, because the error scales with the largest eigenvalue; a shift permits
+    rigid motion.
     """
     shift = SHIFT * np.trace(K) / np.trace(M)
     inverse, shapes = linalg.eigh(M, K + shift * M, check_finite=False, overwrite_b=True)

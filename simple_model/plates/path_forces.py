@@ -23,7 +23,7 @@ def modal_path_forces(
     modes: PlateModes, pressure: MovingPressure, middle: Sequence[float] = MIDDLE
 ) -> Complex:
     """Modal forces (n, m) in N kg^-1/2 of unit pressure on the path, by harmonic of the path;
-    `middle` (2,) in m is that of the plate.
+    `middle` (2,) in m is the centre of the plate.
     """
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     detail = spot_detail(pressure.height, pressure.profile)
@@ -48,11 +48,11 @@ def plate_lines(
     middle: Sequence[float] = MIDDLE,
     path: Complex | None = None,
 ) -> tuple[Floats, Complex]:
-    """Lines of the steady displacement at probes (p, 2) in m, positive the way the pressure pushes:
-    frequencies (f,) in Hz and complex amplitudes (f, p) in m.
+    """Lines of the steady displacement at probes (p, 2) in m, positive in the direction of the
+    pressure: frequencies (f,) in Hz and complex amplitudes (f, p) in m.
 
-    The modulus of bending is as of `modal_motion`, `middle` as of `modal_path_forces`; `path` (n,
-    m) are the modal path forces if known.
+    `modulus` is that of `modal_motion`, `middle` that of `modal_path_forces`; `path` (n, m) are the
+    modal path forces, if known.
     """
     path = modal_path_forces(modes, pressure, middle) if path is None else path
     frequencies, forces = load_lines(pressure).gather(path)

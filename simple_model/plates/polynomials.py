@@ -1,8 +1,8 @@
 """Polynomials on the pieces of a line that meet the supports of its ends, for Ritz's method.
 
 On one piece they are orthonormal combinations of Legendre polynomials P_n(2 x / a), of which n / (a
-/ 2) resolves a wavenumber k. On several pieces they are continuous with their slope, and each is
-zero on all pieces but one or two, so that a piece at rest leaves some of them out: Hermite
+/ 2) resolves a wavenumber k. On several pieces, functions and slopes are continuous. Each function
+is nonzero on one or two pieces only, so that a piece at rest excludes some of them: Hermite
 functions of value and slope at each break, and bubbles within each piece (Babuska, Szabo and Katz,
 SIAM J Numer Anal 18:515 (1981)).
 """
@@ -23,7 +23,7 @@ NULL_RATIO = 1e-10  # of the largest singular value, below which a condition dep
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineBasis:
-    """Functions u_i on the pieces of a line, all of one symmetry or of none.
+    """Functions u_i on the pieces of a line, all with the same symmetry or all with none.
 
     `breaks` (e + 1,) in m from the middle: the ends of the pieces. `legendre` (e, n, i):
     coefficients in the orthonormal Legendre polynomials of each piece. Integrals (i, i): `mass` of
@@ -104,9 +104,8 @@ def line_basis(
 def piecewise_basis(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
 ) -> tuple[LineBasis, ...]:
-    """Functions that are continuous with their slope at the breaks (e + 1,) of a line, in m from
-    the middle, up to `degrees` (e,) of 3 or more on each piece; with `split`, even and odd
-    functions in two bases.
+    """Functions with continuous slopes at the breaks (e + 1,) of a line, in m from the middle, up
+    to `degrees` (e,) of 3 or more on each piece; with `split`, even and odd functions in two bases.
     """
     return _pieces(breaks, ends, degrees, split, "clamped")
 
@@ -114,8 +113,8 @@ def piecewise_basis(
 def continuous_basis(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
 ) -> tuple[LineBasis, ...]:
-    """Functions that are continuous at the breaks of a line, with kinks there; otherwise as
-    `piecewise_basis`, with ends that hold the value, "simply", or not, "free".
+    """Functions that are continuous but have kinks at the breaks of a line. Ends either fix the
+    value, "simply", or not, "free"; see `piecewise_basis` for the rest.
     """
     if len(breaks) == 2:
         return line_basis(float(np.ptp(breaks)), ends, degrees[0], split)
@@ -187,9 +186,7 @@ def _end_functions(degree: int, size: float, derivatives: Sequence[int]) -> Floa
 
 
 def _inner(degrees: Sequence[int], ends: Sequence[str]) -> Iterator[Floats]:
-    """Coefficients (e, n) of the orthonormal bubbles of each piece, even or odd about its
-    middle.
-    """
+    """Coefficients (e, n) of orthonormal bubbles on each piece, even or odd about its middle."""
     for piece, degree in enumerate(degrees):
         n = np.arange(degree + 1)
         for orders in (n[::2], n[1::2]):
@@ -200,9 +197,7 @@ def _inner(degrees: Sequence[int], ends: Sequence[str]) -> Iterator[Floats]:
 
 
 def _symmetric(functions: Floats) -> tuple[Floats, Floats]:
-    """Even and odd combinations (e, n, i) of functions (e, n, k), which include their mirror
-    images.
-    """
+    """Even and odd combinations (e, n, i) of functions (e, n, k) and their mirror images."""
     sign = np.where(np.arange(functions.shape[1]) % 2, -1.0, 1.0)
     mirrored = functions[::-1] * sign[:, None]
     overlap = np.einsum("eni,enj->ij", mirrored, functions, optimize=True)
@@ -214,9 +209,7 @@ def _symmetric(functions: Floats) -> tuple[Floats, Floats]:
 
 
 def _bubbles(degree: int, orders: Ints, ends: Sequence[str]) -> Floats:
-    """Coefficients (n, i) of orthonormal polynomials of some orders that meet the supports of both
-    ends.
-    """
+    """Coefficients (n, i) of orthonormal polynomials that meet the supports of both ends."""
     rows = [
         _at_end(orders, derivative, side)
         for end, side in zip(ends, (-1, 1), strict=True)

@@ -102,8 +102,8 @@ def karman_plate(
     Parameters
     ----------
     modes : PlateModes
-    thickness : m; the membrane stiffness is 12 / thickness^2 times the bending stiffness
-    count : number of modes that stretch the plate, the lowest
+    thickness : float, m; membrane stiffness is 12 / thickness^2 times bending stiffness
+    count : int, number of modes that stretch the plate, the lowest ones
     in_plane : effect of supported edges on the in-plane displacement: "held" fixes it, "sliding"
         fixes only its component across the edge, "movable" leaves it free. Clips with a radius
         always fix it.
@@ -149,7 +149,7 @@ def _bending(modes: PlateModes, chosen: Ints) -> Floats:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Slopes:
     """Slopes of the chosen modes on a grid: derivatives `along` x and `across`, along y, (r, x, y)
-    in kg^-1/2 m^-1, and their `symmetries` (r,) as of `KarmanPlate`.
+    in kg^-1/2 m^-1, and their `symmetries` (r,), see `KarmanPlate`.
     """
 
     grid: Grid

@@ -68,9 +68,7 @@ def layer_line(layer: AbsorbingLayer, half: Floats) -> Floats:
 
 
 def layer_drag(body: Body, layer: AbsorbingLayer, mesh: TetMesh) -> Floats:
-    """Return the damping (m,) in 1/s of the elements of a mesh: 0 in the body, quadratic
-    beyond it.
-    """
+    """Return the damping (m,) in 1/s of the elements: 0 in the body, quadratic beyond it."""
     ends = np.array([body.width / 2, body.height / 2, body.depth])
     middles = np.abs(mesh.points[mesh.tets[:, :4]].mean(axis=1))
     beyond = np.clip(middles - ends, 0.0, None).max(axis=1) / layer.width

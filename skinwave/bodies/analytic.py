@@ -31,9 +31,7 @@ def is_laterally_infinite(body: Body) -> bool:
 
 
 def compliance(body: Body) -> Compliance:
-    """Return the compliance of an infinite body of the same section, with direction-averaged
-    moduli.
-    """
+    """Return the compliance of an infinite body of the same section, with mean moduli."""
     if body.of_kind.compliance is None:
         raise ValueError(
             "the wavenumber integral supports a sheet or a slab, not a body of kind "
@@ -43,9 +41,7 @@ def compliance(body: Body) -> Compliance:
 
 
 def stack(body: Body) -> Stack:
-    """Return the layers of a slab; an absorbing base becomes a half-space of the lowest
-    material.
-    """
+    """Return the layers of a slab; an absorbing base is a half-space of the lowest material."""
     if not body.of_kind.is_layer:
         raise ValueError(f"a body of kind '{body.kind}' is not a stack of flat layers; use a slab")
     return flat_layers(body)

@@ -43,9 +43,7 @@ Discretise = Callable[[Any, float], Discretised]  # of a body and an element siz
 
 
 def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:
-    """Return the mesh with strata as regions, by the depth (m,) of its elements, and their
-    materials.
-    """
+    """Return the mesh with strata as regions, by depths (m,) of elements, and their materials."""
     starts, materials = zip(*strata, strict=True)
     region = np.searchsorted(starts[1:], depths, side="right")
     return replace(mesh, region=region), list(materials)

@@ -28,9 +28,7 @@ GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
 
 def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
-    """Return a structured mesh in layers, with an absorbing layer `wider` times as wide as
-    usual.
-    """
+    """Return a structured mesh in layers, with an absorbing layer `wider` times the usual width."""
     return on_lines(body, body_lines(body, h), wider)
 
 

@@ -77,9 +77,7 @@ def data_of(
 
 
 def comparison_page(scenes: Iterable[Scene]) -> str | None:
-    """Return the page of those scenes whose pack takes seconds; None if there are none, or if the
-    page cannot show them.
-    """
+    """Return the page of the scenes with quick packs; None if there are none or it fails."""
     quick = [scene for scene in scenes if _is_quick(scene.body)]
     try:
         return page(data_of(quick, test=False)) if quick else None

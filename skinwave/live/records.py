@@ -223,9 +223,7 @@ def _loss_scale(solid: Material, loss: float) -> float:
 
 
 def dispersion_of(body: Body) -> dict[str, Any] | None:
-    """Return phase speeds in m/s of a body's propagating waves over frequency in Hz, or None if
-    they are not available.
-    """
+    """Return phase speeds in m/s of the propagating waves over frequency in Hz, or None."""
     try:
         curves = dispersion(body, FREQUENCIES, MODES)
     except (ValueError, ArithmeticError):

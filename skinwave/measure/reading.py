@@ -1,6 +1,4 @@
-"""Measurements from files: text tables, LabVIEW, .npz, .wav, .mat, Universal File Format 58, and
-two published sets.
-"""
+"""Readers of measurements: tables, LabVIEW, .npz, .wav, .mat, UFF 58, and two published sets."""
 
 import io
 import re

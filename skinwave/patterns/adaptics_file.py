@@ -30,9 +30,7 @@ Entry = tuple[float, Any, bool]  # of a track: time in s, value, whether it stay
 
 @dataclass(frozen=True, kw_only=True)
 class Brush:
-    """Figure drawn about a place: its name, its numbers in the order of `BRUSHES`, and frequencies
-    in Hz.
-    """
+    """Figure about a place: its name, numbers in the order of `BRUSHES`, and frequencies in Hz."""
 
     name: str
     numbers: tuple[float, ...]

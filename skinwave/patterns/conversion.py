@@ -72,9 +72,7 @@ def read_pattern(
 
 
 def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """Return a scene in the format of a suffix, and notes; raise a ValueError if the format cannot
-    express it.
-    """
+    """Return a scene in the format of a suffix, and notes; see `convert` for errors."""
     if suffix == ".toml":
         return scene_file.dumps(scene).encode(), ()
     check_load(scene, "a pattern of a device")

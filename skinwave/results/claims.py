@@ -52,9 +52,7 @@ NamedLines = Run | LinesByName
 
 @dataclass(frozen=True, kw_only=True)
 class AssessedClaim:
-    """Whether a claim holds for a body and a model, with the deciding `value` and its threshold
-    `bar`.
-    """
+    """Whether a claim holds for a body and a model; its deciding `value`, and the limit `bar`."""
 
     claim: str
     body: str
@@ -105,9 +103,7 @@ Assessment = tuple[bool, float, float, str]
 
 
 def is_single(run: NamedLines) -> bool:
-    """Whether a run has the kind of Tacton that was measured: one focus, evenly modulated by at
-    most one tone.
-    """
+    """Whether the Tacton is of the measured kind: one focus, with one steady AM tone or none."""
     tacton = run.scene.tacton
     plain = len(tacton.foci) == 1 and not tacton.is_sampled and not tacton.envelope_frequency
     # Claims are about the first of two sinusoids, which must act alone.

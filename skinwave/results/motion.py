@@ -263,9 +263,7 @@ def _coordinates(
     lines: ReducedResponse, times: Floats, material: Material | None = None,
     quantity: Quantity | None = None,
 ) -> Floats:  # fmt: skip
-    """Return reduced coordinates (t, r), with the rates of a quantity and the relaxation of a
-    material.
-    """
+    """Return coordinates (t, r) with the rates of a quantity and the relaxation of a material."""
     f = lines.frequencies
     if not len(f):
         return np.zeros((len(times), lines.lines.shape[1]))

@@ -114,9 +114,7 @@ class Run(OfTacton):
 
 
 def own_names(scene: Scene, listed: Mapping[str, float]) -> dict[str, str]:
-    """Return the listed name (with its frequency in Hz) by itself and by each name of `ASSESSED`
-    that coincides with it.
-    """
+    """Return the listed name of each listed name, and of names in `ASSESSED` at its frequency."""
     same = SAME_LINE / scene.tacton.duration
     own = {name: name for name in listed}
     for name in ASSESSED:

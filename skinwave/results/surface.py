@@ -258,9 +258,7 @@ def _field(
     scene: Scene, x: Floats, y: Floats, lines: Lines, note: str,
     on_body: np.ndarray | None = None,
 ) -> SurfaceField:  # fmt: skip
-    """Return the map from lines (f,), (f, p c) of the probes' quantity, at all places or at those
-    `on_body` (ny nx,).
-    """
+    """Return the map from lines (f,), (f, p c) at all places, or at those `on_body` (ny nx,)."""
     quantity = scene.reading.record
     where = np.ones(len(x) * len(y), bool) if on_body is None else on_body
     count, has_level = int(where.sum()), scene.reading.is_plain and scene.body.is_skin
@@ -294,9 +292,7 @@ def _interpolate(pressure: MovingPressure, lines_at: LinesAt, x: Floats, y: Floa
 
 
 def _is_axisymmetric(pressure: MovingPressure) -> bool:
-    """Whether each line has one amplitude around the origin: one harmonic of a circle, or a focus
-    at rest there.
-    """
+    """Whether each line is axisymmetric: one harmonic of a circle, or a focus at the origin."""
     path = pressure.tacton.trajectory
     if path.shape not in ("point", "circle") or any(path.centre):
         return False

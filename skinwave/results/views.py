@@ -242,9 +242,7 @@ def _flat_view(
     scene: Scene, body: str, model: str, part: tuple[float, int], shape: tuple[Floats, Ints],
     lines_at: LinesAt, motion_at: MotionAt | None = None,
 ) -> View:  # fmt: skip
-    """Return the view of a flat surface from its lines; `motion_at` is given if the motion is not
-    their sum.
-    """
+    """Return the view of a flat surface from lines, or from `motion_at` if not their sum."""
     (points, triangles), (period, frames) = shape, part
     times, places = np.arange(frames) * period / frames, points[:, :2]
     f, lines = lines_at(places)
@@ -299,9 +297,7 @@ def load(path: Path) -> View:
 
 
 def _check_arrays(arrays: dict[str, Array]) -> None:
-    """Raise a ValueError for a wrong shape or type, a number that is not finite, or an index that
-    is out of range.
-    """
+    """Raise a ValueError for a wrong shape, type or index, or a number that is not finite."""
     lengths = {"n": "points", "s": "surface", "f": "times", "g": "tensor_frames",
                "m": "tensor_nodes"}  # fmt: skip
     sizes = {key: len(arrays[name]) for key, name in lengths.items() if name in arrays}

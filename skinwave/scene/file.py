@@ -73,9 +73,7 @@ def loads(text: str) -> Scene:
 
 
 def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
-    """Return the table of a scene's TOML text, with modulus files in a folder replaced by their
-    numbers.
-    """
+    """Return the table of a TOML text; numbers replace the modulus files in a folder."""
     try:
         table = tomllib.loads(text)
     except ValueError as error:
@@ -267,9 +265,7 @@ def _body(values: dict[str, Any], preset: Body | None) -> Body:
 def _of_grammage(
     grammage: float, kind: BodyKind, values: dict[str, Any], thickness_is_given: bool
 ) -> dict[str, Any]:
-    """The density of a sheet of a mass per area in kg/m2 and a given thickness, or its
-    thickness.
-    """
+    """The density or, if not given, the thickness of a sheet from its mass per area in kg/m2."""
     if not kind.is_plate:
         raise ValueError(f'[body] grammage_g_m2 is for a sheet, not "{kind.name}"; remove it')
     if not 0 < grammage < inf:

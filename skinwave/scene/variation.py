@@ -247,9 +247,7 @@ def _check_count(count: int) -> None:
 
 
 def _checked_key(key: str) -> str:
-    """The key, if scenes have it; parts of a value, as in body.material.poisson, are
-    checked later.
-    """
+    """The key, if scenes have it; keys inside a value, like material.poisson, are checked later."""
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
     if key != BODY and ".".join(key.split(".")[:2]) not in known:
         hint = suggestion(key, known) or "; write a key such as tacton.size_mm"

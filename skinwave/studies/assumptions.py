@@ -273,9 +273,7 @@ def as_relaxing(solid: Material, w: float) -> Material:
 
 
 def as_viscous(solid: Material, w: float) -> Material:
-    """Return a Kelvin-Voigt solid with the complex modulus of a generalised Maxwell solid at w in
-    rad/s.
-    """
+    """Return the Kelvin-Voigt solid with the complex modulus of a Maxwell solid at w in rad/s."""
     if not w or not solid.fast_modulus:
         return solid
     relaxing = complex(solid.relaxing_modulus(w))

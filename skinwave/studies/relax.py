@@ -82,9 +82,7 @@ BARS = "Change of the waveform, and of the sensation level (SL), by dropping eac
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HierarchyStep:
-    """Step of the model hierarchy: its dropped assumptions, model and body, and its response or
-    `error`.
-    """
+    """Step of the model hierarchy: dropped assumptions, model, body, and response or `error`."""
 
     name: str
     dropped: tuple[str, ...]

@@ -1,6 +1,4 @@
-"""The report of a scene: one page, its pictures and its data, from a result folder; and the page of
-a map.
-"""
+"""The report of a scene, one page with its pictures and data, and the page of a map."""
 
 import io
 from collections.abc import Sequence

@@ -197,9 +197,7 @@ def optima(
 
 
 def _vertex(x: Floats, y: Floats) -> float:
-    """Return the vertex of the parabola through the best point and its neighbours, or else the best
-    point.
-    """
+    """Return the vertex of the parabola through the best point and its neighbours, or the point."""
     best = float(x[y.argmax()])
     x, first = np.unique(x[np.isfinite(y)], return_index=True)
     y = y[np.isfinite(y)][first]

@@ -107,9 +107,7 @@ def names(out: Path) -> dict[str, int]:
 
 
 def number_rows(wanted: Iterable[str], earlier: Mapping[str, int]) -> dict[str, int]:
-    """Return the index of each wanted row: its place in the design, after the rows of another
-    design.
-    """
+    """Return the index of each wanted row: its place in the design, after rows of other designs."""
     places = {name: k for k, name in enumerate(wanted)}
     if all(places.get(name) == index for name, index in earlier.items()):
         return places
@@ -161,9 +159,7 @@ def _cells(name: str, value: Any) -> Iterable[tuple[str, Any]]:
 
 
 def write_beside(out: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into the folder of a sweep, and list them in its record; raise a ValueError as
-    `check_own_files` does.
-    """
+    """Write files into the folder of a sweep and list them in its record; see `check_own_files`."""
     check_own_files(out, files)
     for name, content in files.items():
         (out / name).parent.mkdir(exist_ok=True)

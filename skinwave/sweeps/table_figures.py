@@ -39,9 +39,7 @@ NAMES = {
 
 
 def varied_keys(rows: Sequence[Row]) -> list[str]:
-    """Return the keys that differ between rows, those with most values first; of a table and a key
-    in it, only the key.
-    """
+    """Return the keys that differ between rows, those with the most values first."""
     keys = [key for key in dict.fromkeys(k for row in rows for k in row) if "." in key]
     counts = {key: len({row.get(key) for row in rows}) for key in keys}
     several = [key for key in keys if counts[key] > 1]

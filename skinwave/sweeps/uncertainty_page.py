@@ -1,6 +1,4 @@
-"""Tables and page parts of uncertainty: of an ensemble of one scene, and of a sweep by
-distributions.
-"""
+"""Tables and page parts of uncertainty: of an ensemble, and of a sweep by distributions."""
 
 import re
 from collections.abc import Iterator, Sequence

@@ -41,9 +41,7 @@ def csv_table(
 
 
 def as_utf_8(content: bytes) -> str:
-    """Decode the content of a file, without a byte order mark; raise a ValueError if it is not
-    UTF-8.
-    """
+    """Decode a file as UTF-8, without a byte order mark; raise a ValueError if it is not UTF-8."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

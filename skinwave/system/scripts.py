@@ -24,9 +24,7 @@ _REFUSED = re.compile(
 
 
 def json_for_script(data: Mapping[str, Any]) -> str:
-    """Return data as JSON that cannot end the script element around it; raise a ValueError if a
-    number is not finite.
-    """
+    """Return data as JSON for a script element; raise a ValueError if a number is not finite."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 
