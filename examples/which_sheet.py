@@ -1,18 +1,18 @@
 """Which sheet did Lim, Seifi and Park measure?
 
 The paper publishes five claims about spectral lines on a sheet of paper (M1 to M5 in
-`docs/results.md`), but not the sheet, the measured points, the quantity of the vibrometer, or the
+`skinwave/results/claims.py`), but not the sheet, the measured points, the quantity of the vibrometer, or the
 drive law of the device. This script samples all of them with a Latin hypercube, computes the lines
 of each candidate under the 15 Tactons, and counts the candidates that show each claim.
 
     python examples/which_sheet.py --samples 2000 -o which-sheet
 
-A candidate takes about a second. The command resumes `candidates.jsonl` after Ctrl-C, and writes
-the nearest sheets as scene files. One with a drive law of this module runs by
+A candidate takes about a second. After Ctrl-C, the same command resumes `candidates.jsonl`. It
+writes the nearest sheets as scene files. To run one with a drive law of this module, use
 
     PYTHONPATH=examples SKINWAVE_EXTENSIONS=which_sheet skinwave run which-sheet/sheet-1.toml
 
-A candidate is a linear plate in air, in the steady state; large sags would make it stiffer.
+A candidate is a linear plate in air, in the steady state. A large sag would make it stiffer.
 """
 
 import argparse
@@ -45,9 +45,9 @@ from skinwave.typing import Array, Bools, Floats, Ints
 
 Row = Mapping[str, Any]  # of a candidate: its parameters and results
 
-COMPRESSION = 0.25  # of the pressure at small drive over that at full drive, less 1
+COMPRESSION = 0.25  # relative excess of the gain at small drive over that at full drive
 SIDES = {"A3": (420, 297), "A4": (297, 210), "A5": (210, 148), "A6": (148, 105)}  # mm
-# Unpublished parameters: words, or the bounds of a number. "square" has sides of side_mm.
+# Unpublished parameters: choices, or the bounds of a number. "square" has sides of side_mm.
 PARAMETERS: dict[str, tuple[Any, ...]] = {
     "size": (*SIDES, "square"),
     "side_mm": (60, 300),
@@ -56,7 +56,7 @@ PARAMETERS: dict[str, tuple[Any, ...]] = {
     "tension_y_n_per_m": (0, 50),
     "grammage_g_m2": (60, 120),
     "young_x_gpa": (4, 9),
-    "young_ratio": (0.3, 0.7),  # across over along
+    "young_ratio": (0.3, 0.7),  # modulus across the grain over that along it
     "loss_factor": (0.01, 0.06),
     "off_middle": (0.0, 0.5),  # of the focus, towards an edge
     "start_mm": (-5, 5),  # of the first point along the radius
@@ -70,7 +70,7 @@ DENSITY, POISSON = 780.0, 0.3  # kg/m3 of office paper; nu_xy
 CLIP_RADIUS, CLEARANCE = 5.0, 30.0  # mm; between the middle of the path and an edge
 CLAIMED = ("M1", "M2", "M3", "M4", "M5")
 ASSESSED_AS = {"M4": "S4"}  # M4 adds velocity to displacement; S4 takes the quantity that is read
-FINEST = 1.35  # bending wavenumbers at the frequency below, for strong lines within 2 %
+FINEST = 1.35  # bending wavenumbers at `RESOLVED`, for strong lines within 2 %
 RESOLVED = 430.0  # Hz, above 2 f_AM, 2 f_d and their neighbours
 COARSEST = 170.0  # rad/m, of the focal spot
 TIMES = np.arange(2500) / 2500.0  # s: lines up to 1250 Hz, for 1 s

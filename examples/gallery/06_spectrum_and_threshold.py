@@ -32,8 +32,8 @@ ax.set(xlim=(15, 400), ylim=(1e-3, 30), xlabel="frequency, Hz", ylabel="amplitud
 ax.legend()
 
 # %%
-# Check of the line at 200 Hz: the integral over wavenumber of the slab's compliance times the
-# transform of the focal spot, as a sum.
+# The line at 200 Hz is checked by a sum over wavenumbers: the compliance of the slab times the
+# transform of the focal spot.
 layer, width = scene.body.solid, gaussian_width(load.height, load.profile)
 k = np.linspace(1.0, 1500.0, 6000)[None, :]  # rad/m
 G = slab(layer, scene.body.depth)(k + 0j, np.array([[2 * np.pi * 200 + 0j]]))

@@ -3,7 +3,7 @@ A silicone disc in three dimensions
 ===================================
 
 A disc of silicone, 80 mm wide and 20 mm high, stands on a rigid base under a focus of 1 Pa at 200
-Hz. Its side is free, but several wavelengths away. At the focus, the disc therefore moves like a
+Hz. Waves decay before they reach its free side. At the focus, the disc therefore moves like a
 layer without sides, which has a closed solution at each wavenumber.
 """
 

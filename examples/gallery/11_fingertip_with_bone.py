@@ -58,4 +58,4 @@ there, back = forces[:, 1] @ u[:, 0], forces[:, 0] @ u[:, 1]  # J
 print(f"work of one load on the motion by the other: {there:.6e} J and {back:.6e} J")
 assert abs(there / back - 1) < 1e-9
 share = np.abs(moved[np.unique(mesh.tets[mesh.region == 1])]).max() / np.abs(moved).max()
-print(f"most that the bone moves: {100 * share:.2f} % of the skin")
+print(f"largest motion of the bone: {100 * share:.2f} % of that of the skin")

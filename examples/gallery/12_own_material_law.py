@@ -15,7 +15,7 @@ from skinwave import Body, Scene, simulate
 
 
 def springpot(w):
-    """Complex shear modulus in Pa of a spring beside a springpot."""
+    """Complex shear modulus in Pa of a spring and a springpot in parallel."""
     return 15e3 * (1 + (1e-3j * w) ** 0.4)
 
 

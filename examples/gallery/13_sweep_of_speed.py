@@ -33,5 +33,5 @@ ax.legend()
 
 # %%
 best = speeds[int(np.argmax(rms))]
-print(f"most at {best:.1f} m/s, Rayleigh wave {skin.rayleigh_speed:.2f} m/s")
+print(f"largest motion at {best:.1f} m/s, Rayleigh wave {skin.rayleigh_speed:.2f} m/s")
 assert abs(best / skin.rayleigh_speed - 1) < 0.25

@@ -12,7 +12,7 @@ Findings of the full design
 ---------------------------
 
 ====== =================== ================================= =============================
-claim  all 2,000           143 that sag below half thickness decided by (share of entropy)
+claim  all 2,000           143 with a sag < thickness / 2    decided by (share of entropy)
 ====== =================== ================================= =============================
 M1     34 % (32 to 36 %)   31 % (24 to 40 %)                 drive law (75 %)
 M2     100 %               100 %                             always holds
@@ -22,12 +22,12 @@ M5     none (below 0.18 %) none (below 2.5 %)                never holds
 ====== =================== ================================= =============================
 
 **No sheet shows all five claims.** M1 needs a third harmonic, which only a clipped or compressed
-drive has. M3 needs a mean pressure, which the linear law lacks. The strongest line besides f_AM
-is f_d - f_AM in 35 % of the candidates, and belongs to the path of 30 mm in 82 %. Its level
-relative to f_AM is +20.4 dB in the median and at least -9.0 dB. M5 requires the multiples of f_AM
-and f_d below -20 dB; the lowest value is -10.7 dB. If "much lower" means 10 dB, one candidate
-shows all five claims; if it means 6 dB, three do. The drive law is the most informative unknown.
-Every other parameter alone, size and support included, gives at most 0.01 bits.
+drive has. M3 needs a mean pressure, which the linear law lacks. The strongest line besides f_AM is
+f_d - f_AM in 35 % of the candidates. In 82 % it occurs on the path of 30 mm. Its level relative to
+f_AM is +20.4 dB in the median and at least -9.0 dB. M5 requires the multiples of f_AM and f_d
+below -20 dB; the lowest value is -10.7 dB. If "much lower" means 10 dB, one candidate shows all
+five claims; if it means 6 dB, three do. The drive law decides most. Every other single parameter,
+including size and support, gives at most 0.01 bits of information.
 
 The nearest sheets show M1 to M4: A3 of 109 g/m² in a frame, A6 of 107 g/m² in a frame, and A3 of
 106 g/m² clamped at its short edges. At large deflection (`fem-nonlinear`) the first two lose M4,
@@ -50,7 +50,7 @@ rows = [assess(each) for each in small[:6]]
 print(findings(rows))
 
 # %%
-# The levels that M4 and M5 are about.
+# The levels that decide M4 and M5.
 figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 part = 100 * np.arange(1, len(rows) + 1) / len(rows)
 for column, words, bar, colour in (

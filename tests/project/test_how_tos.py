@@ -22,7 +22,7 @@ WRITTEN = {
         "fitted/estimates.csv",
     ),
     "own-sheet": ("sheet/lines.csv", "clips/rows"),
-    "silicone-disc": ("disc/responses.npz", "disc.gif", "disc.pvd", "waves/index.html"),
+    "silicone-disc": ("disc/responses.npz", "disc.gif", "disc.pvd"),
     "fingertip": (),
     "bands": ("skin/percentiles.csv", "skin/samples.csv"),
     "own-laws": (),
