@@ -1,9 +1,10 @@
 """Which sheet did Lim, Seifi and Park measure?
 
 The paper publishes five claims about spectral lines on a sheet of paper (M1 to M5 in
-`skinwave/results/claims.py`), but not the sheet, the measured points, the quantity of the vibrometer, or the
-drive law of the device. This script samples all of them with a Latin hypercube, computes the lines
-of each candidate under the 15 Tactons, and counts the candidates that show each claim.
+`skinwave/results/claims.py`), but not the sheet, the measured points, the quantity of the
+vibrometer, or the drive law of the device. This script samples all of them with a Latin hypercube,
+computes the lines of each candidate under the 15 Tactons, and counts the candidates that show each
+claim.
 
     python examples/which_sheet.py --samples 2000 -o which-sheet
 
