@@ -1,6 +1,6 @@
 """Bodies: one file for each kind, which registers a `BodyKind`, and what all kinds share.
 
-Importing this room registers the built-in kinds in this order.
+Importing this package registers the built-in kinds in this order.
 """
 
 from skinwave.bodies import sheet, slab, palm, mesh, finger, disc  # noqa: F401, I001

@@ -39,12 +39,12 @@ def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
     reflections.
 
     Dashpots alone reflect a quarter of a shear wave at 30 degrees. Lengths are multiples of the
-    depth, at most of the depth whose first mode cuts on at `LOWEST_CUT_ON`. On a rigid base, waves
-    are long near the cut-on and decay below it. A plane slab of 50 mm then reflects at most 1.4 %
-    of the motion at the focus at any line, compared with 17 % for dashpots alone
-    (`skinwave.verify.waves`). A free or elastic base carries bending waves at all frequencies,
-    which the layer must damp alone. Above an absorbing base, waves are spherical and as long as
-    those of the lowest material.
+    depth, or of the depth whose first mode cuts on at `LOWEST_CUT_ON` if that is smaller. On a
+    rigid base, waves are long near the cut-on and decay below it. A plane slab of 50 mm then
+    reflects at most 1.4 % of the motion at the focus at any line, compared with 17 % for dashpots
+    alone (`skinwave.verify.waves`). With a free or elastic base, bending waves propagate at all
+    frequencies, and only the layer damps them. Above an absorbing base, waves are spherical, with
+    the wavelength of the lowest material.
     """
     speed = body.solid.shear_speed
     longest = speed / (4 * LOWEST_CUT_ON)
@@ -78,8 +78,8 @@ def layer_drag(body: Body, layer: AbsorbingLayer, mesh: TetMesh) -> Floats:
 def far_springs(body: Body, mesh: TetMesh) -> Support:
     """Return springs at the end of the absorbing layer of a slab on a half-space.
 
-    The half-space resists as it does to a force P at the origin. In incompressible tissue the
-    traction is radial, 3 P c / (2 pi r^2), with c the cosine of the angle to the force. The
+    The half-space is assumed to resist as under a force P at the origin. In incompressible tissue
+    the traction is radial, 3 P c / (2 pi r^2), with c the cosine of the angle to the force. The
     displacement is P / (4 pi mu r) times 2 c radially and the sine of the angle normal to it
     (Johnson, Contact Mechanics (1985), section 3.2). Equal springs in all directions that do the
     same work have, for a normal n,

@@ -12,10 +12,9 @@ from skinwave.typing import Floats
 
 
 def has_exact_waves(body: Body) -> bool:
-    """Whether the wavenumber integral of infinite layers solves a body, except for side
-    reflections.
+    """Whether a wavenumber integral solves a body, apart from reflections from its sides.
 
-    Without loss, the resonances of layers are unbounded.
+    It does not solve layers without loss, whose resonances are unbounded.
     """
     return is_flat_layer(body) and any(solid.has_loss for _, solid in body.strata)
 
@@ -48,7 +47,7 @@ def stack(body: Body) -> Stack:
 
 
 def flat_layers(body: Body) -> Stack:
-    """Return the layers of a body as if all of it were flat and as deep as in its middle."""
+    """Return the layers of a body as if it were flat and everywhere as deep as in its middle."""
     starts, materials = zip(*body.strata, strict=True)
     end = inf if body.base == "absorbing" else body.depth
     thicknesses = [below - top for top, below in zip(starts, (*starts[1:], end), strict=True)]

@@ -56,20 +56,20 @@ class Body:
         "finger" (soft tissue around bone), "disc" or "mesh" (from a file)
     material : name of a preset, or a Material
     width, height, depth : float, m, along x, y and downwards, at most 2; the depth of a slab may be
-        inf, a half-space, which only flat-body can compute
+        inf, a half-space, for flat-body models only
     base, sides : "clamped", "absorbing" or "free"; a base may also be "elastic", a Winkler
-        foundation. The base of a hand is its part that faces downwards, its sides are the ends at
+        foundation. The base of a hand is the part that faces downwards; its sides are the ends at
         wrist and fingers, or the cuts of a file. `Sides` gives each side its own condition.
     base_stiffness : N/m3, traction per displacement of an elastic base, in every direction
-    layers : from the surface downwards; `material` fills the rest
-    relief : of a palm
-    bone : of a finger
-    regions : name or number of a region of the mesh, and its material if it is not `material`, such
-        as bone in soft tissue
-    file, unit, up : of a mesh, as for `meshes.body_from_file`
+    layers : Layers from the surface downwards; `material` fills the rest
+    relief : Relief of a palm
+    bone : Phalanx in a finger
+    regions : (name or number, material) of regions of the mesh that are not of `material`, such as
+        bone in soft tissue
+    file, unit, up : of a mesh, see `meshes.body_from_file`
     placement : position and rotation under the device
     air : bool, whether air moves with both sides of a sheet, as in a baffle; False for vacuum
-    mounting : which sides of a sheet are held, and how it is stretched
+    mounting : Mounting, the supports and the tension of a sheet
 
     Raises a ValueError if a value is unknown, not finite or out of range.
 
@@ -183,7 +183,7 @@ class Body:
 
     @property
     def strata(self) -> tuple[tuple[float, Material], ...]:
-        """Depth in m at which each material begins; equal neighbours are merged."""
+        """(Depth in m at the top, material) of each stratum; equal neighbours are merged."""
         strata: list[tuple[float, Material]] = []
         top = 0.0
         for thickness, material in [
@@ -213,13 +213,13 @@ class Body:
 
     @property
     def softest(self) -> Material:
-        """Material with the slowest shear waves, of the lowest stratum and the regions."""
+        """Material with the slowest shear waves among the lowest stratum and the regions."""
         inside = (solid_of(material) for _, material in self.regions)
         return min((self.solid, *inside), key=lambda solid: solid.shear_speed)
 
     @property
     def conditions(self) -> tuple[str, ...]:
-        """Conditions of the sides, one if they are alike."""
+        """Conditions of the sides, one if all are equal."""
         return (self.sides,) if isinstance(self.sides, str) else (*self.sides.by_name.values(),)
 
     def side(self, name: str) -> str:
@@ -228,7 +228,7 @@ class Body:
 
     @property
     def symmetry(self) -> str:
-        """Axes, of "xy", across whose middle planes the supports are mirror images."""
+        """Axes, out of "xy", across whose middle planes the supports are mirror images."""
         sides = "xy" if isinstance(self.sides, str) else self.sides.symmetry
         return "".join(axis for axis in sides if axis in self.mounting.symmetry)
 
@@ -240,19 +240,19 @@ class Body:
 
     @property
     def is_on_half_space(self) -> bool:
-        """Whether it is a slab whose base and sides all absorb, like part of a half-space."""
+        """Whether it is a slab with absorbing base and sides, like part of a half-space."""
         return self.of_kind.is_layer and {self.base, *self.conditions} == {"absorbing"}
 
     @property
     def is_skin(self) -> bool:
-        """Whether its surface is skin, that is, not a plate and not a preset such as silicone."""
+        """Whether its surface is skin: not a plate, nor a preset such as silicone."""
         top = self.layers[0].material if self.layers else self.material
         others = [PRESETS[name] for name in NOT_SKIN]
         return self.is_solid and solid_of(top) not in others
 
     @property
     def is_solid(self) -> bool:
-        """Whether it is a solid with surface waves, so neither a plate nor "none"."""
+        """Whether it is a solid with surface waves: neither a plate nor "none"."""
         return self.of_kind.discretise is not None and not self.of_kind.is_plate
 
 
@@ -260,41 +260,41 @@ class Body:
 class BodyKind:
     """Kind of body: the keys it takes, how it is meshed, and its waves.
 
-    Callables take a body first. Optional ones are None where a kind does not support them.
+    Functions take a body first. Optional ones are None if the kind does not support them.
 
     Parameters
     ----------
     name : `kind` in a scene
-    keys : attributes of `Body` that only the kinds that list them take
+    keys : attributes of `Body` that not every kind takes, but this one does
     presets : name of a preset body -> attributes that differ from `Body()`; the first preset
         supplies missing keys of a scene
-    check : raises a ValueError for a body that is not possible
+    check : raises a ValueError for an impossible body
     words : kind and size in a few words
     discretise : mesh for an element size in m
-    morph : for the thinnest and the thickest body of a range and an element size in m, a function
-        like `discretise` whose meshes have the same nodes, moved in proportion to the layers, so
-        that matrices are sums of few terms
-    equivalent : thickness in m of the mesh that stands for all thinner bodies, with equivalent
+    morph : function of the thinnest and the thickest body of a range and an element size in m. It
+        returns a function like `discretise` whose meshes have the same nodes, moved in proportion
+        to the layers, so that matrices are sums of few terms
+    equivalent : thickness in m of the mesh that represents all thinner bodies, with equivalent
         modulus and density (`sheet.bending_equivalent`)
     grid_lines : grid lines (n,) in m along x, y and z for an element size in m
     check_size : raises a ValueError for an element size in m that gives too many elements
     default_size : default element size, m
-    interactive_size : element size in m for a response within seconds and errors of some per cent
+    interactive_size : element size in m for a response within seconds and errors of a few per cent
     compliance : wavenumber integral of a laterally infinite body
-    dispersion : dispersion curves of a laterally infinite body of the same section, at frequencies
-        (f,) in Hz with at most so many modes
+    dispersion : dispersion curves of a laterally infinite body of the same section, for frequencies
+        (f,) in Hz and a largest number of modes
     wave_speed : phase speed in m/s of its surface waves at a frequency in Hz
     named_sides : names of the sides that may have separate conditions
     is_plate : whether it is thin: it bends, tension stiffens it, and air adds mass
     is_layer : whether it is a layer of uniform depth, which may be inf
     is_symmetric : whether its mesh may be halved at x = 0 and y = 0
-    is_bounded : whether width and height are those of its surface
+    is_bounded : whether its surface has this width and height
     may_be_layered : whether it may have layers
-    actual_size : size in m of a mesh whose cells come in whole numbers
-    conforming : whether elements follow its layers
-    may_be_coated : whether layers thinner than elements may become a coat
-    normal_patch : m, standard deviation of the area about a probe whose mean normal is the
-        direction of its motion; 0 for the normal at the probe
+    actual_size : element size in m of a mesh with whole numbers of cells
+    conforming : whether the elements follow its layers
+    may_be_coated : whether layers thinner than elements can become a coat
+    normal_patch : m, standard deviation of the area around a probe over which the normal, the
+        direction of its motion, is averaged; 0 for the normal at the probe
     """
 
     name: str
@@ -346,8 +346,7 @@ BODIES: dict[str, Body] = {}  # presets by name
 
 
 def register(kind: BodyKind) -> BodyKind:
-    """Add a kind of body and its presets; raises a ValueError for a name that is already
-    registered.
+    """Register a kind of body and its presets; raises a ValueError if the name is registered.
 
     A preset of a known kind needs no registration: `BODIES[name] = Body(...)`.
     """
@@ -358,14 +357,14 @@ def register(kind: BodyKind) -> BodyKind:
 
 
 def kind_of(name: str) -> BodyKind:
-    """Return the kind of a name; raises a ValueError if it is unknown."""
+    """Return the kind with a name; raises a ValueError if it is unknown."""
     if name not in KINDS:
         extensions.load()
     return KINDS[choose("body kind", name, KINDS)]
 
 
 def check_keys(kind: BodyKind, names: Set[str]) -> None:
-    """Refuse attributes, by name, that only other kinds of body take."""
+    """Refuse attributes, given by name, that only other kinds of body take."""
     for name in sorted(names - set(kind.keys)):
         if takers := [f'"{each.name}"' for each in KINDS.values() if name in each.keys]:
             raise ValueError(

@@ -24,9 +24,9 @@ COMPARED = 4 / 3  # of the coarsest element size: limit of meshes that estimate 
 class Build:
     """Meshed body, as arguments of `fem.assemble`.
 
-    `fixed` are facet sets with their fixed components; `held` (n, 3) are additional fixed
-    components. `drag` (m,) in 1/s is that of the absorbing layer. `coat` and `support` are those of
-    a hand, `stiffener`, `tension` and `axes` (2, 3) along the sides those of a sheet.
+    `fixed` are facet sets with their fixed components; `held` (n, 3) marks additional fixed
+    components of nodes. `drag` (m,) in 1/s is that of the absorbing layer. `coat` and `support`
+    belong to hands; `stiffener`, `tension` and `axes` (2, 3) along the sides belong to sheets.
     """
 
     mesh: TetMesh
@@ -58,9 +58,9 @@ def build(
 ) -> Build:
     """Mesh a body with its materials and boundary conditions.
 
-    `h` is the element size in m, by default that of the body. Across the axes of `symmetry`, "x",
-    "y" or "xy", only the part at positive coordinates is meshed, with symmetry conditions.
-    `discretise` replaces that of the kind. Raises a ValueError if the body has no such mesh.
+    `h` is the element size in m, by default that of the body. `symmetry`, "x", "y" or "xy", meshes
+    only the part at positive coordinates along these axes, with symmetry conditions. `discretise`
+    replaces the function of the kind. Raises a ValueError if there is no such mesh.
     """
     size = check_element_size(body, h or default_size(body), COMPARED)
     discretise = discretise or body.of_kind.discretise

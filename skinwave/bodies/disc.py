@@ -1,4 +1,4 @@
-"""Disc: a cylinder on its base, such as silicone that stands for skin."""
+"""Disc: a cylinder on its base, such as silicone that represents skin."""
 
 from dataclasses import replace
 
@@ -20,12 +20,12 @@ def check(body: Body) -> None:
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Return ten-node tetrahedra of at most h in m, in equal rings and the layers of the body."""
+    """Return ten-node tetrahedra of h in m at most, in equal rings and in the body's layers."""
     return _in_strata(body, disc(body.width, body.depth, h, body.interfaces[1:-1]))
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Return a mesher that stretches the layers of the thickest disc to those of another."""
+    """Return a function that meshes another disc by stretching the layers of the thickest one."""
     mesh = discretise(thickest, h).mesh
 
     def moved(body: Body, h: float) -> Discretised:

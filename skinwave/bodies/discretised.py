@@ -23,8 +23,8 @@ class Discretised:
     """Mesh of a body in its own frame, with the facet sets `top`, `bottom` and `sides`.
 
     `materials` are those of the regions, `coat` has thin layers at the top, `tension` is that of a
-    sheet. The callables take the mesh that symmetry leaves: `drag` returns the damping (m,) in 1/s
-    of its elements, `support` its elastic and absorbing support, `held` the held components (n, 3)
+    sheet. The functions take the mesh, halved by symmetry: `drag` returns the damping (m,) in 1/s
+    of its elements, `support` its elastic and absorbing support, `held` the fixed components (n, 3)
     of its nodes in place of the sides, and `stiffener` a matrix (3 n, 3 n) in N/m for
     `fem.assemble`.
     """

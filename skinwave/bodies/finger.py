@@ -1,4 +1,4 @@
-"""Parametric fingertip: soft tissue around a bone, held where it is cut from the finger."""
+"""Parametric fingertip: soft tissue around a bone, supported where it is cut from the finger."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def shape(body: Body) -> Fingertip:
 
 
 def actual_size(body: Body, h: float) -> float:
-    """Return the cell size in m at the skin of a mesh with a whole number of shells."""
+    """Return the cell size in m at the skin for a whole number of shells."""
     return quarter_circumference(shape(body)) / shell_count(shape(body), h)
 
 

@@ -18,8 +18,8 @@ NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of that of the focal sp
 def discretise(body: Body, h: float) -> Discretised:
     """Return ten-node tetrahedra about the middle of a hand, growing away from it.
 
-    Facet sets are `top`, a `bottom` that the file names, and `sides` where it was cut or names
-    them. The support acts on the other facets that face downwards.
+    Facet sets are `top`, a `bottom` if the file names one, and `sides`, cut here or named in the
+    file. The support acts on other facets that face downwards.
     """
     mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
     cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]

@@ -37,7 +37,7 @@ CELL = 0.85
 def discretise(body: Body, h: float) -> Discretised:
     """Return ten-node tetrahedra of h in m about the middle of the palm, growing away from it.
 
-    The support below stands for bone, that at both ends for the tissue that was cut.
+    The support below represents bone; those at both ends represent the tissue that was cut off.
     """
     try:
         mesh = mapped_palm(body.palm, *body_lines(body, h))
@@ -52,7 +52,7 @@ def discretise(body: Body, h: float) -> Discretised:
 
 
 def _coarsest(body: Body, h: float) -> float:
-    """Largest element; larger ones do not follow the rim, where waves reflect."""
+    """Largest element size in m; larger elements do not follow the rim, where waves reflect."""
     return max(SURFACE * h, min(COARSEST * h, RIM * body.palm.edge_radius))
 
 

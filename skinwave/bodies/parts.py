@@ -33,9 +33,9 @@ class Layer:
 
 @dataclass(frozen=True, kw_only=True)
 class Relief:
-    """Relief of a palm, in m, as for `meshes.Palm`; with all heights 0, a slab with rounded edges.
+    """Relief of a palm, in m, see `meshes.Palm`; with all heights 0, a slab with rounded edges.
 
-    Values of None are those of an adult, reduced where the palm is too small for them.
+    None stands for the value of an adult, reduced if the palm is too small for it.
     """
 
     cup_depth: float | None = None
@@ -46,7 +46,7 @@ class Relief:
     edge_radius: float | None = None
 
     def of(self, breadth: float, length: float, thickness: float) -> Palm:
-        """Return the palm of a size in m with this relief."""
+        """Return the palm with this relief; sizes in m."""
         thin = min(1.0, thickness / (2 * EDGE_RADIUS))
         corner = min(Palm.corner_radius, ROUNDEST * min(breadth, length) / 2)
         usual = {
@@ -128,7 +128,7 @@ class Placement:
         return about_y @ about_x
 
     def __call__(self, points: Floats) -> Floats:
-        """Return points (n, 3) of the body at their position under the device."""
+        """Return points (n, 3) of the body in their position under the device."""
         if self == FLAT:
             return points
         return points @ self.rotation.T + [*self.offset, self.lift]
@@ -140,7 +140,7 @@ FLAT = Placement()
 
 
 def solid_of(material: str | Material) -> Material:
-    """Return the material of a name, or the given one."""
+    """Return the material with a name, or the given material."""
     return PRESETS[material] if isinstance(material, str) else material
 
 
@@ -159,6 +159,6 @@ def check_regions(regions: Sequence[tuple[str, str | Material]]) -> None:
 
 
 def check_material(material: str | Material) -> None:
-    """Refuse the name of an unknown material."""
+    """Raise a ValueError for the name of an unknown material."""
     if isinstance(material, str):
         choose("material", material, PRESETS)

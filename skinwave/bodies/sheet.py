@@ -46,13 +46,13 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
 
 
 def _fixed_nodes(body: Body, mesh: TetMesh) -> Bools:
-    """Held components (n, 3) of nodes; those of a tilted sheet are held completely."""
+    """Fixed components (n, 3) of nodes; a tilted sheet is clamped in all components."""
     components = supported_components(body.mounting, mesh)
     return components | (components.any(axis=1, keepdims=True) & body.placement.is_tilted)
 
 
 def equivalent(body: Body) -> float:
-    """Return the thickness in m of the elements, small compared with the sheet and its clips."""
+    """Return the thickness in m of the mesh, small compared with the sheet and its clips."""
     least = SHEET_THICKNESS * min(body.width, body.height)
     reach = body.mounting.clip_radius if body.mounting.clips else 0.0
     return min(least, CLIP_THICKNESS * reach) if reach else least
@@ -100,7 +100,7 @@ def check_isotropic(body: Body) -> None:
 
 
 def compliance(body: Body) -> Compliance:
-    """Return the compliance of an infinite sheet, with the mean properties of its directions."""
+    """Return the compliance of an infinite sheet, with properties averaged over directions."""
     return thin_sheet(
         body.solid, body.depth, air_density=AIR_DENSITY if body.air else 0.0,
         tension=body.mounting.mean_tension,
@@ -119,7 +119,7 @@ def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
 def bending_wavenumber(body: Body, frequency: float) -> float:
     """Return the bending wavenumber k in rad/m of an infinite sheet at a frequency in Hz.
 
-    It solves D k^4 + T k^2 = (m + 2 rho / k) w^2, with the mean D and T of the directions of an
+    It solves D k^4 + T k^2 = (m + 2 rho / k) w^2, with D and T averaged over the directions of an
     orthotropic sheet.
     """
     w, D = 2 * pi * frequency, body.bending_stiffness
@@ -143,7 +143,7 @@ def air_mass(body: Body, frequency: float) -> float:
 
 
 def open_air(body: Body) -> str:
-    """Return how a sheet with air around free edges is held, or an empty text."""
+    """Return in words how a sheet with air around free edges is held, or an empty text."""
     if not body.air or (body.sides == "clamped" and body.mounting.is_frame):
         return ""
     return body.mounting.words if body.sides == "clamped" else f"with {body.sides} sides"

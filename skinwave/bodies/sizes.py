@@ -1,8 +1,8 @@
-"""Element sizes of a body: default, coarsest and refused ones; and its coat.
+"""Element sizes of a body: default, coarsest and valid ones; and its coat.
 
-Layers thinner than half an element become a coat, `fem.Coat`, from the surface to the last of them.
-A coat is at most a tenth of the shortest shear wavelength in it and below it at 400 Hz, which
-Kirchhoff's kinematics allow (docs/method.md states the errors).
+Layers thinner than half an element become a coat, `fem.Coat`, which extends from the surface to the
+last such layer. Kirchhoff's kinematics limit its thickness to a tenth of the shortest shear
+wavelength in it and below it at 400 Hz (docs/method.md states the errors).
 """
 
 from math import inf, isfinite
@@ -21,7 +21,7 @@ THICKEST, AT = 0.1, 400.0  # coat over a shear wavelength at Hz, the highest lin
 
 
 def check_mesh(body: Body, h: float) -> None:
-    """Refuse elements of h in m that are larger than the body, or too many."""
+    """Refuse elements of h in m that are larger than the body or too many."""
     body.of_kind.check_size(body, check_element_size(body, h))
 
 
@@ -88,7 +88,7 @@ def without_coat(strata: Strata, count: int) -> Strata:
 
 
 def resolving_size(strata: Strata) -> float:
-    """Return the coarsest size in m of elements that resolve layers without following them."""
+    """Return the coarsest size in m of elements that resolve layers without conforming to them."""
     return min(thicknesses(strata)) / THINNEST
 
 
@@ -100,7 +100,7 @@ def coarsest_size(body: Body) -> float:
 
 
 def coat_count(body: Body, h: float) -> int:
-    """Return the number of strata in the coat: the smallest that elements of h then resolve."""
+    """Return the smallest number of strata in a coat so that elements of h resolve the rest."""
     most = largest_coat(body)
     fits = (k for k in range(most) if resolving_size(without_coat(body.strata, k)) >= h)
     return next(fits, most)
@@ -123,6 +123,6 @@ def meshed_strata(body: Body, h: float) -> Strata:
 
 
 def layer_name(body: Body, solid: Material) -> str:
-    """Return the preset that a layer of a material is, or "a layer"."""
+    """Return the name of the preset in a layer with this material, or "a layer"."""
     named = (layer.material for layer in body.layers if isinstance(layer.material, str))
     return next((name for name in named if solid_of(name) == solid), "a layer")

@@ -33,7 +33,7 @@ def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Return a mesher that stretches the layers of the thickest slab to those of another."""
+    """Return a function that meshes another slab by stretching the layers of the thickest one."""
     x, y, z = body_lines(thickest, h)
     depths = thickest.interfaces
     return lambda body, h: on_lines(body, (x, y, -np.interp(-z, depths, body.interfaces)))

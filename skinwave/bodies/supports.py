@@ -24,9 +24,10 @@ DEFAULT_SIDE = "absorbing"
 
 @dataclass(frozen=True, kw_only=True)
 class Sides:
-    """Condition of each side: left (least x), right, front (least y) and back.
+    """Condition of each side: left (smallest x), right, front (smallest y) and back.
 
-    An empty text stands for the default, or a side that the body does not have.
+    Each is "clamped", "absorbing" or "free"; others raise a ValueError. An empty text stands for
+    the default, or for a side that the body does not have.
     """
 
     left: str = ""
@@ -49,12 +50,12 @@ class Sides:
 
     @property
     def symmetry(self) -> str:
-        """Axes, of "xy", across whose middle planes the sides are mirror images."""
+        """Axes, out of "xy", across whose middle planes the sides are mirror images."""
         return "x" * (self.left == self.right) + "y" * (self.front == self.back)
 
 
 def complete_sides(sides: str | Sides, known: Sequence[str], kind: str) -> str | Sides:
-    """Return the sides of a body, one word if all are alike, with defaults for missing ones.
+    """Return the sides of a body with defaults for missing ones, as one word if all are equal.
 
     `known` are the names of the sides of its kind; others raise a ValueError.
     """
@@ -94,7 +95,7 @@ def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> 
 
 
 def winkler_foundation(mesh: TetMesh, facets: Ints, stiffness: float) -> Support:
-    """Return springs in all directions, of a stiffness in N/m3."""
+    """Return springs in all directions with a stiffness in N/m3."""
     k = np.full(len(facet_points(mesh, facets)), stiffness)
     return Support(facets=facets, stiffness=k, absorbed=np.zeros_like(k))
 
@@ -116,8 +117,8 @@ class Mounting:
 
     Parameters
     ----------
-    edges : names of the held edges: left, right, front, back
-    support : "clamped", or "simply" for held edges that may turn
+    edges : names of the supported edges: left, right, front, back
+    support : "clamped", or "simply" for edges that may turn
     clips : (x, y) in m, middles of clips, squares along the sides in which nothing moves
     clip_radius : float, m, half a side of these squares
     tension_x, tension_y : float, N/m, uniform, 0 or above
@@ -154,7 +155,7 @@ class Mounting:
 
     @property
     def is_frame(self) -> bool:
-        """Whether all of its edges are held, and nothing else."""
+        """Whether all edges are supported, without clips."""
         return self.edges == tuple(EDGES) and not self.clips
 
     @property
@@ -174,7 +175,7 @@ class Mounting:
 
     @property
     def symmetry(self) -> str:
-        """Axes, of "xy", across whose middle planes the supports are mirror images."""
+        """Axes, out of "xy", across whose middle planes the supports are mirror images."""
         return "".join(name for name, axis in (("x", 0), ("y", 1)) if self._is_mirrored(axis))
 
     def _is_mirrored(self, axis: int) -> bool:
@@ -204,7 +205,7 @@ FRAME = Mounting()
 
 
 def check_extent(mounting: Mounting, width: float, height: float) -> None:
-    """Refuse clips outside a sheet of a width and height in m, and a curl that is not shallow."""
+    """Refuse clips outside a sheet, width and height in m, and a curl that is not shallow."""
     for name, side in (("curl_x", width), ("curl_y", height)):
         most = 1e3 * STEEPEST * side
         cure = ", the limits of a shallow shell; reduce it"
@@ -236,13 +237,13 @@ def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
 
 
 def supported_components(mounting: Mounting, mesh: TetMesh) -> Bools:
-    """Return the components (n, 3) of nodes that supports hold, of a flat sheet or its symmetric
+    """Return the components (n, 3) of nodes that supports fix, for a flat sheet or its symmetric
     part.
 
-    Clamped sections neither move along the sheet nor turn. Their deflection is held only in the
-    middle plane: bending changes the thickness by Poisson's effect, and held faces would stiffen
-    the sheet in proportion to its thickness, which is larger in elements. A simple support holds
-    the deflection of an edge and the motion along it, and the motion across it only in the middle
+    Clamped sections neither move along the sheet nor turn. Their deflection is fixed only in the
+    middle plane: bending changes the thickness by Poisson's effect, so that fixed faces would
+    stiffen the sheet in proportion to the thickness of its mesh. A simple support fixes the
+    deflection of an edge and the motion along it, but the motion across it only in the middle
     plane, so that the section may turn.
     """
     points = mesh.points

@@ -25,7 +25,7 @@ STIFFEST = 1e6  # stiffness of bone, over the shear stiffness of the whole thick
 
 
 def hand_size(body: Body) -> float:
-    """Return the default element size of a hand, m, for any depth."""
+    """Return the default element size in m of a hand of any depth."""
     return min(HAND_CELL, max(coarsest_size(body), FINE_PALM))
 
 
@@ -54,11 +54,11 @@ def support(
     given.
 
     Bone lies below. The `ends` of a palm are where it was cut: each has a condition and the cosine
-    (k q,) of its direction with the `outward` normals (k q, 3). Of a surface whose normal has the
-    cosine c with such a direction, a share s is supported, which rises smoothly from 0 at c = 0.2
-    to 1 at 1. A clamped share rests on soft tissue over bone, whose thickness falls as the share
-    rises: springs of mu/d s/(1 - s + 1e-6) per area, with the mean thickness d of the body. An
-    elastic share has the springs of the base, an absorbing one dashpots.
+    (k q,) of its direction with the `outward` normals (k q, 3). Where the normal of the surface has
+    the cosine c with such a direction, a share s is supported, which rises smoothly from 0 at c =
+    0.2 to 1 at c = 1. A clamped share rests on soft tissue over bone, whose thickness falls as the
+    share rises: springs of mu/d s/(1 - s + 1e-6) per area, with the mean thickness d of the body.
+    An elastic share has the springs of the base, an absorbing one dashpots.
     """
     below = [] if "bottom" in mesh.facets else [(body.base, -outward[:, 2])]
     stiffness, absorbed = np.zeros((2, len(outward)))
@@ -104,8 +104,8 @@ def in_regions(
     """Return the mesh with its own material in each element of a named `region` (m,), and
     materials.
 
-    Raises a MeshError if the names do not fit the regions of the `source`, or `body.material` has
-    no element.
+    Raises a MeshError if the names do not fit the regions of the `source`, or if no element has
+    `body.material`.
     """
     named = replace(mesh, region=region)
     if not body.regions and len(np.unique(region)) > 1:
@@ -130,7 +130,7 @@ def in_regions(
 
 
 def _number_of(name: str, mesh: TetMesh, source: str) -> int:
-    """Number of a region of a mesh by its name or number."""
+    """Number of a region of a mesh, given its name or number."""
     numbers = set(np.unique(mesh.region).tolist())
     known = {title: number for number, title in mesh.region_names.items() if number in numbers}
     known = {str(number): number for number in numbers} | known

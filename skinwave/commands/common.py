@@ -45,7 +45,7 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
 
 
 def add_scenes(parser: argparse.ArgumentParser, default: str) -> None:
-    """Add the scene files of a live page, and name the bodies of a page without any."""
+    """Add the scene files of a live page; `default` describes a page without any."""
     parser.add_argument(
         "scenes", nargs="*", type=Path, metavar="SCENE",
         help=f"scene files (TOML) whose bodies and Tactons the page offers (default: {default})",
@@ -53,7 +53,7 @@ def add_scenes(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def add_file_frame(parser: argparse.ArgumentParser) -> None:
-    """Add unit and orientation of the file of a body."""
+    """Add unit and orientation of the coordinates in a body's file."""
     parser.add_argument(
         "--unit", default="m", help="unit of the body's file: m (default), cm, mm, um or in"
     )
@@ -105,14 +105,14 @@ def add_model(parser: argparse.ArgumentParser, *, has_steps: bool = True) -> Non
 
 
 def solving(options: argparse.Namespace, progress: "Progress", **more: Any) -> "SolveOptions":
-    """Return the element size and the solver of a command as options of a solution."""
+    """Return the element size and the solver of a command as `SolveOptions`."""
     from skinwave.models.options import SolveOptions
 
     return SolveOptions(h=metre(options.h), solver=options.solver, progress=progress, **more)
 
 
 def plan_of_command(options: argparse.Namespace, scene: "Scene", **more: Any) -> "Plan":
-    """Plan a scene by the options of a command, and print the warnings of the plan."""
+    """Plan a scene with the options of a command, and print the warnings of the plan."""
     from skinwave.models.options import SolveOptions
     from skinwave.planning.plan import plan
 
@@ -173,9 +173,9 @@ def result_folder(
     inputs: Iterable[str | Path] = (),
     scene: "Scene | None" = None,
 ) -> "Iterator[tuple[Path, Progress]]":
-    """Yield the folder of a result, that of --out or else the default, and a progress callback.
+    """Yield the folder of a result, --out or the default, and a progress callback.
 
-    The folder gets its record at the end, unless it has one already, and is then put in place.
+    At the end the folder gets its record, unless it has one, and replaces the target.
     """
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
@@ -189,7 +189,7 @@ def result_folder(
 
 
 def closing(options: argparse.Namespace, sentences: list[str], **summary: Any) -> None:
-    """Print the sentences of a result and its page, or all of them as JSON."""
+    """Print the sentences and the page of a result, or everything as JSON."""
     summary = {"out": str(options.out), "sentences": sentences} | summary
     summarise(options, summary, "\n".join([*sentences, f"open {options.out}/index.html"]))
 
@@ -203,7 +203,7 @@ def summarise(options: argparse.Namespace, summary: dict[str, Any], text: str) -
 
 
 def metre(millimetre: float | None) -> float | None:
-    """Convert millimetre to metre; None stays None."""
+    """Convert mm to m; None stays None."""
     return None if millimetre is None else millimetre / 1e3
 
 

@@ -19,8 +19,8 @@ MISSING = "not installed"
 
 
 def examine() -> list[dict[str, str]]:
-    """Return findings about versions, solver, renderer, threads, cache and optional packages: what,
-    its value, and a cure if it can be improved.
+    """Return (what, value, cure) of versions, solver, renderer, threads, cache and optional
+    packages; the cure is empty if nothing can be improved.
     """
     drawing, solvers, home = renderer(), fem.available(), cache.folder()
     limits = ", ".join(f"{name}={os.environ[name]}" for name in THREADS if name in os.environ)

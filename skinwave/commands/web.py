@@ -51,9 +51,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def open_privately(address: str, folder: Path) -> None:
-    """Open an address in the browser by a file in a private folder that redirects to it.
+    """Open an address in the browser through a file in a private folder that redirects to it.
 
-    Other users of the machine can read a browser's command line, which must not hold the token.
+    Other users can read a browser's command line, which must not contain the token.
     """
     import webbrowser
 

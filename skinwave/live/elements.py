@@ -1,9 +1,9 @@
-"""Packs of bodies of finite elements: the poles of a reduced model for every path of the focus.
+"""Packs of finite-element bodies: the poles of a reduced model for any path of the focus.
 
     u(x, w) = sum_p O_p(x) F_p / (i w - pole_p) + conj(O_p(x) F_p(-w) / (-i w - pole_p))
 
-The reduced basis is the proper orthogonal decomposition of the steady motion under focal spots all
-over the area, at frequencies of the band. Stiffness, damping and mass are symmetric, so the load
+The reduced basis is the proper orthogonal decomposition of the steady motion under focal spots over
+the whole area, at frequencies of the band. Stiffness, damping and mass are symmetric, so the load
 acts through the same fields O_p that give the motion. Per area of the grid, the force of the load
 is proportional to the cosine of the slope: its square (`skinwave.scene.load`), over a larger area.
 """
@@ -43,7 +43,7 @@ NEGLIGIBLE = 1e-4  # relative RMS motion that the basis may miss
 
 
 def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str, Any]:
-    """Return the pack of a body of finite elements of size `h` in m, as a dict for JSON."""
+    """Return the pack of a finite-element body with elements of `h` in m, as a dict for JSON."""
     progress("mesh", 0.0)
     body = relaxing(body, FIT_TOLERANCE)
     made = build(body, h)
@@ -68,7 +68,7 @@ def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str,
 
 
 def training_knots(body: Body) -> Floats:
-    """Return places (j, 2) in m of focal spots all over the area, on a triangular grid."""
+    """Return places (j, 2) in m of focal spots over the whole area, on a triangular grid."""
     rows = int(2 * REACH / (SPACING * 0.75**0.5)) + 1
     half = np.array([body.width, body.height]) / 2 if body.of_kind.is_bounded else np.full(2, REACH)
     grid = [

@@ -1,4 +1,4 @@
-"""Packs of bodies: the data from which the page computes their motion."""
+"""Packs: data from which the page computes the motion of bodies."""
 
 import hashlib
 import json
@@ -45,7 +45,7 @@ def resting_scene(body: Body) -> Scene:
 
 
 def pack_of(body: Body, progress: Progress = silent) -> dict[str, Any]:
-    """Return the pack of a body as a dict for JSON. Packs of finite elements are cached."""
+    """Return the pack of a body as a dict for JSON. Packs of finite-element bodies are cached."""
     method = method_of(body)
     if method != "poles":
         return {"radial": radial_pack, "modal": sheet_pack}[method](body, progress)

@@ -75,7 +75,7 @@ class _Path(NamedTuple):
 
 
 def _frequencies(body: Body) -> Floats:
-    """Frequencies (f,) in Hz of a table, half as many above `MIDDLE` if loss damps motion there."""
+    """Frequencies (f,) in Hz, half as dense above `MIDDLE` if loss damps the motion there."""
     w = 2 * np.pi * MIDDLE
     moduli = [solid.complex_modulus(w) for _, solid in body.strata]
     damped = min(modulus.imag / modulus.real for modulus in moduli) > DAMPED
@@ -84,7 +84,7 @@ def _frequencies(body: Body) -> Floats:
 
 
 def _tabulate(path: _Path) -> fem.Complex:
-    """g (f, r) at some distances for the narrowest profile."""
+    """Response g (f, r) at some distances for the narrowest profile."""
     k, width = path.k, spot_width(LOWEST)
     shares = width**2 * np.exp(-((k * width) ** 2) / 2) * k * path.weights
     return np.asarray(path.G @ (shares[:, None] * jv(0, k[:, None] * DISTANCES[::CHECKED])))

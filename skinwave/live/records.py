@@ -1,4 +1,4 @@
-"""Records of bodies for the page: title, values that a user may change, dispersion, and pack."""
+"""Records of bodies for the page: title, editable values, dispersion, and pack."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -63,8 +63,8 @@ class Editable:
 def record_of(
     body: Body, pack: Mapping[str, Any], name: str = "", title: str = "", *, waves: bool = True
 ) -> dict[str, Any]:
-    """Return the record of a body for the page, a dict for JSON, with its pack and, if `waves`, its
-    dispersion curves. Name and title are the body's own by default.
+    """Return the record of a body as a dict for JSON, with its pack and, if `waves`, its dispersion
+    curves. Name and title are those of the body by default.
     """
     kind, infinite = body.of_kind, method_of(body) == "radial"
     extent = [500 * body.width, 500 * body.height] if kind.is_bounded and not infinite else None
@@ -99,8 +99,8 @@ def body_of(toml: str) -> Body:
 
 
 def with_changes(body: Body, changes: Mapping[str, Any]) -> Body:
-    """Return a body with other values, by key of its `editables`. Raises ValueError if a key is
-    unknown or a value is out of range.
+    """Return a body with changed values, by keys of its `editables`. Raises a ValueError if a key
+    is unknown or a value is out of range.
     """
     for key, value in changes.items():
         own = {each.key: each for each in editables(body)}
@@ -120,8 +120,8 @@ def with_changes(body: Body, changes: Mapping[str, Any]) -> Body:
 
 
 def editables(body: Body) -> list[Editable]:
-    """Return the values of a body that a page can change: those of its layers from the surface
-    downwards, the density of a single layer, the mounting of a sheet, base and sides of a slab.
+    """Return the values of a body that a page can change: layers from the surface downwards,
+    density of a single layer, mounting of a sheet, base and sides of a slab.
     """
     if not body.of_kind.discretise:
         return []

@@ -36,8 +36,8 @@ Places = tuple[tuple[float, float], ...]
 def selftest(
     body: Body, name: str, count: int, lowest: float, error: float
 ) -> list[dict[str, Any]]:
-    """Return random Tactons on a body with their steady lines at a point: records of the body's
-    name, the values, the lines [{f in Hz, re, im in m}] and the allowed relative error.
+    """Return random Tactons on a body with their steady lines at a point, as records of the body's
+    name, the values, the lines [{f in Hz, re, im in m}] and the largest relative error.
     """
     rng = np.random.default_rng(SEED)
     records: list[dict[str, Any]] = []
@@ -62,9 +62,9 @@ def selftest(
 
 
 def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
-    """Return a model of a body that does not use its pack: functions of a scene with one probe that
-    give its lines, frequencies (f,) in Hz and amplitudes (f,) in m, and its motion (t,) from rest;
-    and the places (p, 2) in m where it is known, () for any.
+    """Return a model of a body without its pack: two functions of a scene with one probe, for its
+    lines, frequencies (f,) in Hz and amplitudes (f,) in m, and for its motion (t,) from rest; and
+    the places (p, 2) in m where they are valid, () for any.
     """
     method = method_of(body)
     if method != "poles":
@@ -98,8 +98,8 @@ def _lines_of_sheet(scene: Scene) -> tuple[Floats, Complex]:
 def random_scene(
     body: Body, rng: np.random.Generator, lowest: float = LOWEST, places: Places = ()
 ) -> Scene:
-    """Return a scene of a random Tacton that the controls can set, with the focus at `lowest` in m
-    or higher and the probe at one of the places, () for any.
+    """Return a scene with a random Tacton that the controls can set. The height of the focus is at
+    least `lowest` in m, and the probe is at one of the places, () for any.
     """
     bounded = body.of_kind.is_bounded
     half = min(0.025, *((body.width / 2, body.height / 2) if bounded else ()))

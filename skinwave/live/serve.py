@@ -81,8 +81,8 @@ class Server(ThreadingHTTPServer):
         return f"http://127.0.0.1:{self.server_port}{self.base}?token={self.token}"
 
     def compute(self, work: Callable[[Progress], _T]) -> _T:
-        """Return the result of `work(progress)`. The progress raises `Superseded` once newer work
-        has come. Only one work runs at a time.
+        """Return the result of `work(progress)`. The callback raises `Superseded` when newer work
+        arrives. Only one call runs at a time.
         """
         own = self._newest = next(self._numbers)
 
@@ -169,7 +169,7 @@ class _Handler(BaseHTTPRequestHandler):
         return path[len(base) :] if path.startswith(base) else path.removeprefix("/")
 
     def _is_local(self) -> bool:
-        """Whether the request is for this machine's own name. Behind a proxy, any name is valid."""
+        """Whether the request names this machine. Behind a proxy, any name is valid."""
         host, origin = self.headers.get("Host", ""), self.headers.get("Origin", "")
         if self.server.base != "/":
             return True
@@ -189,7 +189,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _print_fault(error: BaseException | None) -> None:
-    """Print an error of the server in one line of its terminal."""
+    """Print a fault of the server in one line on its terminal."""
     text = printable(f"{type(error).__name__}: {error}"[:LONGEST_LINE], keep="")
     say(f"skinwave: a request failed: {text}", sys.stderr)
 
@@ -199,7 +199,7 @@ def _json(value: Any) -> bytes:
 
 
 def _error_answer(error: Exception) -> tuple[HTTPStatus, str]:
-    """Status and sentence for an error. Errors of the server itself go to its terminal."""
+    """Status and sentence for an error. Faults of the server are printed on its terminal."""
     if isinstance(error, Superseded):
         return HTTPStatus.CONFLICT, "A newer request has replaced this one."
     if isinstance(error, EXPECTED):

@@ -33,12 +33,12 @@ SAMPLED = (0.0, 600.0, 1000.0)  # Hz at which these combinations are sampled
 
 
 def grid_line() -> Floats:
-    """Coordinates (SIDE,) in m of the grid of fields along each side."""
+    """Coordinates (SIDE,) in m of the grid of fields, along either side."""
     return np.asarray(STEP * (np.arange(SIDE) - (SIDE - 1) / 2))
 
 
 def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
-    """Return the pack of a flat, held sheet as a dict for JSON."""
+    """Return the pack of a flat sheet with supports as a dict for JSON."""
     progress("modes of the sheet", 0.0)
     modes = modes_of(plate_of(body))
     middle, line = np.asarray(body.placement.offset), grid_line()

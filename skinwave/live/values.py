@@ -1,6 +1,6 @@
 """Values of the page's controls for scenes, for the paper's Tactons and for worked examples.
 
-Keys and units are those of `static/values.js`. Controls without a value keep theirs.
+Keys and units are those of `static/values.js`. A control without a value does not change.
 """
 
 from typing import Any
@@ -114,7 +114,7 @@ def _path_values(tacton: Tacton, path: Trajectory) -> Values:
 
 
 def _is_movable(tacton: Tacton) -> bool:
-    """Whether a path that is not centred can be the own path of a single focus."""
+    """Whether a path off the centre can be the path of a single focus."""
     path = tacton.trajectory
     swept = path.shape == "line" and path.sweep != "there_and_back"
     return len(tacton.foci) == 1 and path.shape in SHAPES and path.size > 0 and not swept

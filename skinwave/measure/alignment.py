@@ -25,11 +25,11 @@ class Alignment:
 
     Parameters
     ----------
-    delay, delay_error : s, and its standard error from the noise; 0 if given
-    gain, gain_error : unit of the measurement over that of the model, likewise
-    repeats : s, distance of the nearest other delay that fits as well within the noise; inf if the
-        window has none
-    chi_square : of the residual over its degrees of freedom; 1 for noise
+    delay, delay_error : s, and its standard error from the noise, 0 for a given delay
+    gain, gain_error : in units of the measurement per unit of the model, and its standard error
+    repeats : s, distance to the nearest other delay that fits equally well within the noise; inf if
+        the window has none
+    chi_square : chi-square of the residual per degree of freedom; 1 for noise
     """
 
     delay: float
@@ -40,7 +40,7 @@ class Alignment:
     chi_square: float = np.nan
 
     def apply(self, frequencies: Floats, model: np.ndarray) -> np.ndarray:
-        """Return the amplitudes (f, p) of a model with the gain and the delay."""
+        """Apply gain and delay to the amplitudes (f, p) of a model."""
         turned = np.exp(-2j * np.pi * frequencies * self.delay)
         return np.asarray(self.gain * turned[:, None] * model)
 
@@ -63,18 +63,18 @@ def align(
     ----------
     lines : MeasuredLines
     model : (f, p) complex, amplitudes of the same lines in the model
-    window, centre : s, the delay is searched within half a window of the centre
+    window, centre : s, the search covers delays within half a window of the centre
     delay : s, if known
-    gain : unit of the measurement over that of the model, if known
+    gain : in units of the measurement per unit of the model, if known
 
     Returns
     -------
-    Alignment; its standard errors contain only noise, which may differ from place to place
+    Alignment; its standard errors include only noise, which may vary between places
 
     Raises
     ------
     ValueError
-        If the model has none of the lines, or a given number is not finite.
+        If the model has none of the lines or a given number is not finite.
     """
     for name, value in (("delay", delay), ("gain", gain)):
         if value is not None and not np.isfinite(value):
@@ -107,7 +107,7 @@ def align(
 
 
 def opposite_sign(model: str, has_delay: bool) -> str:
-    """Return a warning that a measurement fits a model as well with the opposite sign."""
+    """Return a warning that a measurement fits a model equally well with the opposite sign."""
     delay = ", at another delay" * has_delay
     return (
         f"with the opposite sign the measurement fits {model} as well or better{delay}: check "
@@ -119,7 +119,7 @@ def _weights(lines: MeasuredLines) -> Floats:
     """Return the weight (f, 1) of each line, one over its variance; 1 if none is known.
 
     The variance is the mean over the places, shrunk to that of all lines with `PRIOR_FREEDOM`,
-    because the noise of few repetitions would also be in the weights.
+    because the weights would otherwise contain the noise of few repetitions.
     """
     known = np.isfinite(lines.variance) & (lines.variance > 0)
     counts = known.sum(axis=1, keepdims=True)
@@ -138,10 +138,10 @@ def _best_delay(
     window: float,
     centre: float,
 ) -> tuple[float, float]:
-    """Return the smallest delay in s that fits as well as any, and the distance of the next one.
+    """Return the smallest of the best delays in s, and the distance to the next one.
 
-    Chi-square is 2 (sum w |z|^2 - c^2 / b) with correlation c and size b or, with a given gain g,
-    2 (sum w |z|^2 - 2 g c + g^2 b). If the model misfits, its residual takes the place of noise.
+    Chi-square is 2 (sum w |z|^2 - c^2 / b) with correlation c and size b or, with a given gain g, 2
+    (sum w |z|^2 - 2 g c + g^2 b). If the model misfits, its residual replaces the noise.
     """
     shifted = products * np.exp(2j * np.pi * lines.frequencies * centre)
     delays, heights = maxima(lines.frequencies, shifted, window)

@@ -1,9 +1,9 @@
 """Recordings in named arrays: NumPy archives and MATLAB files.
 
 Times, places, drive and texts are identified by their names; the motion by --variable, by its name,
-or as the only other array that fits. One published set has its own form: Reardon et al., Sci. Adv.
-9, eadf2037 (2023), doi 10.1126/sciadv.adf2037, record 10.5281/zenodo.7686560. Its y (N, M, 2) is
-the velocity along the laser in m/s at N places, M times, 2 repetitions, each with a reference r.
+or as the only suitable array. One published set has a form of its own: Reardon et al., Sci. Adv. 9,
+eadf2037 (2023), doi 10.1126/sciadv.adf2037, record 10.5281/zenodo.7686560. Its y (N, M, 2) is the
+velocity along the laser in m/s at N places, M times, 2 repetitions, each with a reference r.
 """
 
 from collections.abc import Iterable, Mapping
@@ -46,7 +46,7 @@ Arrays = Mapping[str, np.ndarray]
 
 
 def read_npz(path: Path, given: Given) -> Recording:
-    """Return the recording in an .npz file, skinwave's own or another program's."""
+    """Return the recording in an .npz file of skinwave or another program."""
     with reading.open_regular(path):
         pass
     try:
@@ -160,7 +160,7 @@ def _last(name: str) -> str:
 def _in_order(
     values: np.ndarray, samples: int, places: int, name: str, remarks: list[str]
 ) -> np.ndarray:
-    """Return values (r, n, p) for any order of axes, from known numbers of samples and places."""
+    """Return values (r, n, p) from any order of axes, given the numbers of samples and places."""
     values = values if values.ndim <= 3 else values.squeeze()
     sizes = values.shape
     if not 1 <= values.ndim <= 3:
@@ -231,7 +231,7 @@ def _times(arrays: Arrays) -> np.ndarray:
 def _times_within(
     values: np.ndarray, name: str, given: Given, remarks: list[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times of a column that rises evenly, and the other columns."""
+    """Return the evenly rising column as times, and the other columns."""
     count = values.shape[2]
     rising = [p for p in range(count) if np.isrealobj(values) and rises(values[0, :, p])]
     if not rising or count < 2:

@@ -1,4 +1,4 @@
-"""Claims of Lim, Seifi and Park, assessed on a measurement within its noise."""
+"""Claims of Lim, Seifi and Park, assessed on a measurement with noise."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ PRESENT = {  # lines that a claim expects, while others are to be weak
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredClaim:
-    """A claim, its finding (`HOLDS`, `FAILS` or `UNDECIDED`) in a measurement, and the reason."""
+    """A claim, its result in a measurement (`HOLDS`, `FAILS` or `UNDECIDED`), and the reason."""
 
     claim: str
     finding: str
@@ -44,7 +44,7 @@ def by_name(
     unresolved: Sequence[str],
     spectrum: tuple[Floats, Floats],
 ) -> LinesByName:
-    """Return lines at the probes of a scene by every name; `names` has all names by the first."""
+    """Return lines at the probes of a scene by all names; `names` maps first names to all."""
     size = np.abs(lines.mean)
     radius = lines.radius(1 - (1 - CONFIDENCE) / max(size.size, 1))
     every = [(name, k) for k, aliases in enumerate(names.values()) for name in aliases]
@@ -57,7 +57,7 @@ def by_name(
 
 
 def assess_measured(measured: LinesByName) -> list[MeasuredClaim]:
-    """Return every claim about such a Tacton, decided if all amplitudes in the noise agree."""
+    """Return all claims about such a Tacton, decided if all amplitudes in the noise agree."""
     if not is_single(measured):
         return []
     kind = measured.is_am, measured.is_stm

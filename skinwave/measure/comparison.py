@@ -43,7 +43,7 @@ MOST_DRAWN = 8  # places
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured:
-    """A measurement to compare with, its delay in s and its gain over bodies, if known."""
+    """A measurement to compare with; its delay in s and its gain relative to bodies, if known."""
 
     measurement: Measurement
     delay: float | None = None
@@ -83,7 +83,7 @@ class MeasuredComparison:
 
     @property
     def noise(self) -> float:
-        """Misfit that noise alone would leave; nan if unknown."""
+        """Misfit of a perfect model, from noise alone; nan if unknown."""
         known = self.lines.variance[np.isfinite(self.lines.variance)]
         if not len(known):
             return float("nan")
@@ -92,7 +92,7 @@ class MeasuredComparison:
 
     @property
     def bodies(self) -> list[ModelColumn]:
-        """Columns of bodies, or the last kernel if there are none."""
+        """Columns of bodies, or that of the last kernel if there are none."""
         bodies = [c for c in self.columns if c.run.response.record.of_body]
         return bodies or list(self.columns[-1:])
 
@@ -119,12 +119,12 @@ class MeasuredComparison:
 
     @property
     def figure_places(self) -> np.ndarray:
-        """Indices of the places in figures, those with the strongest lines."""
+        """Indices of the places that figures show: those with the strongest lines."""
         return strongest(np.linalg.norm(self.lines.mean, axis=0), MOST_DRAWN)
 
 
 def compare_measured(measured: Measured, runs: Sequence[Run]) -> MeasuredComparison:
-    """Return the comparison of runs of one Tacton, at the places of the measurement."""
+    """Compare runs of one Tacton with a measurement, at its places."""
     measurement = measured.measurement
     bodies = [run for run in runs if run.response.record.of_body]
     scene = (bodies or list(runs))[-1].scene  # a body has the load of the scene file
@@ -164,7 +164,7 @@ def lines_to_compare(
 
 
 def _clock(measurement: Measurement) -> list[Response]:
-    """Return a zero response with the times, or the bins, of a measurement."""
+    """Return a response of zeros at the times, or with the bins, of a measurement."""
     if not measurement.is_spectrum:
         return [_silence(evenly(measurement))]
     width, rate = bin_width(measurement), 2.1 * measurement.frequencies[-1]
@@ -205,7 +205,7 @@ def _column(measured: Measured, run: Run, lines: MeasuredLines) -> ModelColumn:
 
 
 def _delay_window(measurement: Measurement, run: Run, lines: MeasuredLines) -> tuple[float, float]:
-    """Return width and centre in s of the delays at which record and Tacton overlap enough."""
+    """Return width and centre in s of delays at which record and Tacton overlap enough."""
     begin, end = (float(t) for t in run.response.times[[0, -1]])
     period = 1 / float(lines.frequencies.min())
     if measurement.is_spectrum:
@@ -225,8 +225,8 @@ def overlap(measurement: Measurement, run: Run, delay: float) -> float:
 def at_measured_places(scene: Scene, measurement: Measurement) -> Scene:
     """Return the scene with probes at the measured places, which read displacement.
 
-    Raises a ValueError if the quantity is not normal motion, places are unknown and not as many as
-    probes, or the record resolves no line of the load.
+    Raises a ValueError if the quantity is not normal motion, if places are unknown and differ in
+    number from the probes, or if the record resolves no line of the load.
     """
     if not measurement.record.is_normal:
         known = ", ".join(name for name, q in QUANTITIES.items() if q.is_normal and q.of_body)
@@ -244,7 +244,7 @@ def at_measured_places(scene: Scene, measurement: Measurement) -> Scene:
 
 
 def in_quantity(run: Run, quantity: str, prepared: Mapping[str, ReducedBody]) -> Run:
-    """Return a body's run in another quantity of normal motion; kernels are unchanged."""
+    """Return a body's run in another quantity of normal motion; kernels stay the same."""
     if not run.response.record.of_body or run.response.quantity == quantity:
         return run
     scene = replace(run.scene, quantity=quantity)
@@ -265,7 +265,7 @@ def measured_places(comparison: MeasuredComparison) -> MeasuredPlaces:
 
 
 def runs_to_draw(comparison: MeasuredComparison) -> list[Run]:
-    """Return the models and the measurement on their clock, at the places in figures."""
+    """Return models and measurement on one clock, at the places that figures show."""
     drawn = comparison.figure_places
     runs = []
     for run in (*(column.run for column in comparison.columns), _measured_run(comparison)):

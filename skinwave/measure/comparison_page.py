@@ -54,7 +54,7 @@ ABOUT_CLAIMS = (
 def page_section(
     comparison: MeasuredComparison, picture: Callable[[str, Figure, str], Picture]
 ) -> Section:
-    """Return the section; `picture(name, figure, caption)` makes a part of a page."""
+    """Return the section; `picture(name, figure, caption)` returns a part of a page."""
     lines, main, at = comparison.lines, comparison.main, comparison.figure_places
     columns = {c.run.column: c for c in comparison.columns}
     figure = lines_figure(
@@ -228,7 +228,7 @@ def remarks(comparison: MeasuredComparison) -> list[str]:
 
 
 def _repetitions(comparison: MeasuredComparison) -> str:
-    """Return how often the motion was measured, and what the noise is estimated from."""
+    """Return the number of repetitions, and the source of the noise estimate."""
     shifts = comparison.lines.shifts
     if len(shifts) > 1:
         aligned = f", aligned by up to {1e3 * np.ptp(shifts):.3g} ms" * bool(shifts.any())
@@ -239,7 +239,7 @@ def _repetitions(comparison: MeasuredComparison) -> str:
 
 
 def _outside(comparison: MeasuredComparison, column: ModelColumn) -> list[str]:
-    """Return a sentence if much of the record lies outside the Tacton at its delay."""
+    """Return a sentence if much of the delayed record lies outside the Tacton."""
     if comparison.measurement.is_spectrum:
         return []
     delay, duration = column.alignment.delay, float(np.ptp(comparison.measurement.times))

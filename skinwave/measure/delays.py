@@ -1,5 +1,5 @@
-"""Delays between signals: places measured one after the other are aligned by their references,
-lines by the maxima of the correlation of two sums of sinusoids.
+"""Delays between signals. Places measured in turn are aligned by their references, lines by maxima
+of the correlation of two sums of sinusoids.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ def correlation(
 ) -> Floats:  # fmt: skip
     """Return the correlation Re sum s exp(2 pi i f d) at delays (d,) in s, or its n-th derivative.
 
-    The products s (f,) are the sums of conj(model) times measured at frequencies (f,) in Hz.
+    The products s (f,) are sums of conj(model) * measured, at frequencies (f,) in Hz.
     """
     s = 2j * np.pi * frequencies
     turned = np.exp(np.multiply.outer(np.atleast_1d(delays), s))
@@ -63,8 +63,8 @@ def in_step(each: np.ndarray, frequencies: Floats) -> tuple[np.ndarray, Floats]:
     """Return repetitions (r, f, p) shifted onto their mean, and their delays (r,) in s.
 
     Delays are the least squares over all lines and places, within a period of the lowest line.
-    Repetitions stay, with zero delays, unless an F test of the residual with and without shifts is
-    significant for as many independent delays as were tried.
+    Repetitions are shifted only if an F test of the residual with and without shifts is significant
+    for the number of independent delays that were tried; otherwise delays are 0.
     """
     r = len(each)
     unshifted = each, np.zeros(r)
@@ -101,7 +101,7 @@ def _weights(each: np.ndarray) -> Floats:
 
 
 def _best_delay(frequencies: Floats, products: np.ndarray, window: float) -> float:
-    """Return the delay in s of the highest correlation, the smallest of equally high ones."""
+    """Return the delay in s of the highest correlation, the smallest if there are several."""
     delays, heights = maxima(frequencies, products, window)
     alike = heights >= heights.max() - 1e-9 * np.abs(products).sum()
     return float(delays[alike][np.argmin(np.abs(delays[alike]))])
@@ -138,7 +138,7 @@ def align_by_references(values: Floats, references: Floats) -> tuple[Floats, Flo
 
 
 def _lags(references: Floats) -> Floats:
-    """Return delays (r, p) in samples of references (r, t, p) behind the first, by correlation."""
+    """Return delays (r, p) in samples of references (r, t, p) relative to the first."""
     from scipy.signal import correlate  # slow to import
 
     centred = references - references.mean(axis=1, keepdims=True)

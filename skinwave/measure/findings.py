@@ -1,4 +1,4 @@
-"""Sentences on a fit: results, warnings, and what the fitted scene cannot hold."""
+"""Sentences on a fit: results, warnings, and what the fitted scene cannot store."""
 
 from collections.abc import Iterator
 
@@ -19,7 +19,7 @@ CORRELATED = 0.1  # smallest correlation that is mentioned
 
 
 def sentences(result: Fit) -> list[str]:
-    """Return sentences on what was fitted, and how well."""
+    """Return sentences on the fitted keys and the quality of the fit."""
     solution, data = result.solution, result.solution.problem.data
     ratio = significant(solution.cost / solution.dof)
     known = f"; chi squared over its degrees of freedom is {ratio}, with known errors"
@@ -121,7 +121,7 @@ def probability(p: float) -> str:
 
 
 def notes(result: Fit) -> list[str]:
-    """Return sentences, without a full stop, on what the fitted scene cannot hold."""
+    """Return sentences, without a full stop, on what the fitted scene cannot store."""
     parameters = result.solution.problem.parameters
     sentences = [
         f"{key} = {value:.6g} belongs to the measurement and is not part of the scene"

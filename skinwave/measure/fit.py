@@ -54,8 +54,8 @@ class Fit:
         """The scene with the estimates and their spreads.
 
         The spread of a number is the standard error of its interval, normal or, for a logarithm,
-        lognormal; without an interval, or at a limit, it is uniform between the limits. Numbers of
-        a preset that were not fitted keep the spread of the preset.
+        lognormal. Without an interval, or at a limit, it is uniform between the limits. Other
+        numbers of a preset keep the spread of the preset.
         """
         scene, parameters = self.target.scene, self.solution.problem.parameters
         changed = with_values(scene, of_scene(self.values))
@@ -109,7 +109,7 @@ def fit(
     Raises
     ------
     ValueError
-        If a key, a limit or the model does not fit the scene, or the measurement has no such data.
+        If a key, a limit or the model does not suit the scene, or the measurement has no such data.
     """
     parameters = parse(vary, tie)
     kind = choose("kind", kind or ("lines" if measured.is_spectrum else "waveforms"), KINDS)
@@ -125,7 +125,7 @@ def fit(
 
 
 def _distribution(limits: Parameter, estimate: Estimate, half: float) -> Distribution:
-    """Return the distribution of an estimate with half an interval in the unit interval."""
+    """Return the distribution of an estimate; `half` is half its interval, of the unit interval."""
     if not estimate.is_resolved or estimate.at_limit:
         return Distribution(shape="uniform", measure="bounds", width=(limits.low, limits.high))
     deviation = half * limits.span / float(ndtri((1 + LEVEL) / 2))
@@ -135,7 +135,7 @@ def _distribution(limits: Parameter, estimate: Estimate, half: float) -> Distrib
 
 
 def _may_have_spread(scene: Scene, key: str) -> bool:
-    """Whether a scene file can hold a spread of a key: derived keys and coordinates cannot."""
+    """Whether a scene file can store a spread of a key: derived keys and coordinates have none."""
     if key.partition(".")[2] in DERIVED:
         return False
     path, _, name = key.rpartition(".")

@@ -80,7 +80,7 @@ def write(folder: Path, result: Fit) -> None:
 
 
 def fitted_scene(result: Fit) -> str:
-    """Return the scene file with estimates and spreads, and comments on what it cannot hold."""
+    """Return the scene file with estimates and spreads, and comments on what it cannot store."""
     return "".join(["# fitted\n", *(f"# {note}\n" for note in notes(result)), dumps(result.scene)])
 
 
@@ -205,7 +205,7 @@ def _largest(values: np.ndarray) -> np.ndarray:
 
 @mpl.rc_context(REPORT.rc)
 def residual_figure(result: Fit) -> Figure:
-    """Return weighted residuals along their axis, and their autocorrelation if it is known."""
+    """Draw weighted residuals over their axis and, if known, their autocorrelation."""
     data, solution = result.solution.problem.data, result.solution
     residual = solution.residual / np.sqrt(solution.scale)
     scale, label = (1e3, "time, ms") if data.is_in_time else (1.0, "frequency, Hz")

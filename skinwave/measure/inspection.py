@@ -60,7 +60,7 @@ class Inspection:
 
     @property
     def noise(self) -> Floats:
-        """Noise floor (p,) of the kept places, median over frequency, in unit/sqrt(Hz) or, for
+        """Noise floor (p,) of the searched places, median over frequency, in unit/sqrt(Hz) or, for
         spectra, the unit; nan if unknown.
         """
         if self.spectrum is None:
@@ -69,7 +69,7 @@ class Inspection:
 
 
 def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
-    """Return the inspection; noise alone has any line with the probability `alarm`."""
+    """Inspect a measurement; `alarm` is the probability that noise alone yields any line."""
     if not 0 < alarm < 1:
         raise ValueError(f"the false-alarm probability {alarm:g} must be between 0 and 1")
     missing = list(measured.remarks)
@@ -125,8 +125,8 @@ def unsteady(
 ) -> list[str]:
     """Return a sentence, without a full stop, if a line of waveforms changes between both halves.
 
-    It changes by more than the noise, by more than the `least` share, and by more than its phase
-    turns within `TURN_ERRORS` of the errors (f,) of its frequency in Hz.
+    The change must exceed the noise, the share `least`, and what a phase error explains:
+    `TURN_ERRORS` times the errors (f,) in Hz of its frequency.
     """
     count = len(measured.times)
     half = int((1 - SETTLE) * count) // 2
@@ -192,7 +192,7 @@ def _origins(measured: Measurement, spectrum: LineSpectrum | None, part: slice) 
 
 
 def _is_multiple(line: SpectralLine, base: SpectralLine, n: int, duration: float) -> bool:
-    """Whether a line may be the n-th multiple of another within their errors."""
+    """Whether a line can be the n-th multiple of another within their errors."""
     within = SAME_LINE * float(np.hypot(line.error, n * base.error)) + 0.05 / duration
     return abs(line.frequency - n * base.frequency) <= within
 
@@ -229,9 +229,9 @@ def _mains(
 
 
 def clip_count(waveform: Floats) -> int:
-    """Return how many samples of a waveform (t,) are cut off at its largest or smallest value.
+    """Return the number of samples of a waveform (t,) that are cut off at its extreme values.
 
-    A peak that rounding flattens has as many samples in the step below; a clipped one has not.
+    A peak flattened by rounding has as many samples one step below; a clipped peak does not.
     """
     return _cut_off(waveform) + _cut_off(-waveform) if np.ptp(waveform) > 0 else 0
 

@@ -45,7 +45,7 @@ METHOD = (
 
 
 def write(folder: Path, inspection: Inspection) -> None:
-    """Write index.html, measured.png, found-lines.csv, measurement.npz and, unless large, .csv."""
+    """Write index.html, measured.png, found-lines.csv, measurement.npz and, if small, .csv."""
     measured = inspection.measured
     (folder / "measurement.npz").write_bytes(writing.to_npz(measured))
     if measured.values.size <= MOST_CELLS:
@@ -75,14 +75,14 @@ def line_table(inspection: Inspection) -> Table:
 
 
 def largest(inspection: Inspection) -> Table:
-    """Return the row of each line at the place where it is largest."""
+    """Return one row for each line, at the place where it is largest."""
     rows, count = line_table(inspection).rows, len(inspection.kept)
     best = [n * count + int(line.amplitudes.argmax()) for n, line in enumerate(inspection.lines)]
     return Table(COLUMNS, [rows[k] for k in best])
 
 
 def sentences(inspection: Inspection) -> list[str]:
-    """Return sentences on content, noise, clipping and places where nothing varies."""
+    """Return sentences on content, noise, clipping and constant places."""
     measured, where = inspection.measured, np.flatnonzero(inspection.clipped.sum(axis=0))
     record, noise = measured.record, inspection.noise[np.isfinite(inspection.noise)]
     lines = [
@@ -190,7 +190,7 @@ def figure(inspection: Inspection) -> Figure:
 
 
 def _waveforms(ax: Axes, inspection: Inspection, at: np.ndarray) -> None:
-    """Draw the mean waveforms where they are largest, one above the other."""
+    """Draw the mean waveforms at the places of largest motion, one above the other."""
     measured, places = inspection.measured, inspection.kept[at]
     record, mean = measured.record, measured.mean - measured.mean.mean(axis=0)
     size = np.abs(mean[:, places]).max(axis=1, initial=0.0)

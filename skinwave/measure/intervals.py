@@ -1,4 +1,4 @@
-"""Intervals of a fit from the covariance at its solution, and what the data do not resolve.
+"""Intervals of a fit from the covariance at its solution, and directions that data do not resolve.
 
 At the solution the residual changes by its slopes J over the unit cube. With s^2 the scale of the
 variances and J / s = U diag(S) V^T, a move by d along a column of V changes the residual by S d
@@ -7,7 +7,7 @@ the data do not resolve it (Transtrum, Machta and Sethna, Phys Rev E 83:036701 (
 
 If residuals are not white, intervals are widened. An estimate moves by d = P e with the errors e, P
 the pseudo-inverse of the slopes; for stationary e, the variance of d is a sandwich covariance, as
-in `lines`, with the residuals' periodogram, smoothed over the root of their number (Daniell).
+in `lines`, with the periodogram of the residuals, smoothed over the root of their number (Daniell).
 """
 
 from dataclasses import dataclass
@@ -48,8 +48,8 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Whiteness:
-    """Ljung and Box's test of residuals: autocorrelations (lags,), and the probability `p` of as
-    large ones in white noise.
+    """Ljung and Box's test of residuals: autocorrelations (lags,), and the probability `p` that
+    those of white noise are as large.
     """
 
     correlations: Floats
@@ -74,7 +74,7 @@ class Intervals:
 
 
 def intervals(solution: Solution) -> Intervals:
-    """Return the intervals of a solution; those of logarithms are symmetric in these."""
+    """Return the intervals of a solution; they are symmetric in logarithms where these vary."""
     scale, shape = max(solution.scale, 1e-300), solution.residual.shape
     left, singular, vt = np.linalg.svd(solution.slopes / np.sqrt(scale), full_matrices=False)
     singular = np.maximum(singular, ROUND_OFF * max(float(singular.max()), 1e-300))
@@ -109,7 +109,7 @@ def intervals(solution: Solution) -> Intervals:
 
 
 def _estimate(solution: Solution, k: int, to_end: Floats, away: float) -> Estimate:
-    """Return the estimate of parameter k, with interval ends `to_end` (k,) from the solution."""
+    """Return the estimate of parameter k, whose interval ends `to_end` (k,) from the solution."""
     parameter, u, half = solution.problem.parameters.free[k], float(solution.u[k]), float(to_end[k])
     low, high, is_curved = np.nan, np.nan, False
     if half < UNRESOLVED:

@@ -1,13 +1,13 @@
-"""Search for spectral lines in waveforms: which frequencies rise above the noise, and how surely.
+"""Search for spectral lines in waveforms that rise significantly above the noise.
 
 A line is a peak of the periodogram (Hann window, mean of R repetitions) above the noise floor. In
 Gaussian noise their ratio has an F distribution with 2 R and nu degrees of freedom, nu from the
-variance of a running median (Welch 1967). The false-alarm probability is that of one bin times bins
-and places (Bonferroni). Lines are searched strongest first and fitted together with a linear trend.
-Frequencies follow from Gauss-Newton steps with the amplitudes projected out (Golub and Pereyra,
-SIAM J. Numer. Anal. 10, 1973). Standard errors are the Cramer-Rao bound, for one sinusoid of
-amplitude A over a time T in noise of one-sided density S 3 S / (pi^2 A^2 T^3) (Rife and Boorstyn,
-IEEE Trans. Inf. Theory 20, 1974, eq. 17).
+variance of a running median (Welch 1967). The false-alarm probability of one bin is multiplied by
+the numbers of bins and places (Bonferroni). Lines are searched for in order of strength and fitted
+together with a linear trend. Frequencies follow from Gauss-Newton steps with the amplitudes
+projected out (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). Standard errors are the Cramer-Rao
+bound, for one sinusoid of amplitude A over a time T in noise of one-sided density S 3 S /
+(pi^2 A^2 T^3) (Rife and Boorstyn, IEEE Trans. Inf. Theory 20, 1974, eq. 17).
 """
 
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ LARGEST_STEP = 0.5  # bins
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpectralLine:
     """Line with its `frequency` and standard `error` in Hz, `amplitudes` (p,) in SI, root mean
-    square over repetitions, and the probability `false_alarm` of any such line in noise alone.
+    square over repetitions, and `false_alarm`, the probability of any such line in noise alone.
     """
 
     frequency: float
@@ -66,14 +66,14 @@ class _Fit:
 
     @property
     def power(self) -> Floats:
-        """Squared amplitudes (l, p), means over repetitions."""
+        """Squared amplitudes (l, p), averaged over repetitions."""
         return np.asarray((np.abs(self.amplitudes) ** 2).mean(axis=1))
 
 
 def find_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> LineSpectrum:
     """Return lines and noise floor of repetitions of waveforms (r, t, p) at a rate in Hz.
 
-    Noise alone has any line with the probability `alarm`. Raises a ValueError for fewer than 32
+    `alarm` is the probability of any line in noise alone. Raises a ValueError for fewer than 32
     samples.
     """
     runs, count, places = values.shape
@@ -113,7 +113,7 @@ def find_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> LineSpec
 
 
 def _densities(x: Floats, runs: int, rate: float, window: str = "hann") -> Floats:
-    """Return the one-sided densities (f, p) of waveforms (t, r p), means over repetitions."""
+    """Return the one-sided densities (f, p) of waveforms (t, r p), averaged over repetitions."""
     weights = cosines(window, len(x))
     spectra = np.abs(np.fft.rfft(x * weights[:, None], axis=0)) ** 2
     density = 2 * spectra / (rate * np.sum(weights**2))
@@ -148,7 +148,7 @@ def peaks(
 
 
 def _side_lobe(bins: int) -> float:
-    """Return a bound of the Hann window's power some bins from a line, relative to the line."""
+    """Return a bound of the Hann window's power at a distance in bins, relative to the line."""
     return 1.0 if bins < 2 else LEAKAGE / (np.pi * bins * (bins**2 - 1)) ** 2
 
 
@@ -166,7 +166,7 @@ def _bins(frequencies: Floats, x: Floats, floor: Floats, rate: float) -> np.ndar
 
 
 def _errors(fit: _Fit, rate: float, floor: Floats, runs: int) -> Floats:
-    """Return standard errors in Hz in the residual without a window, which has transients."""
+    """Return standard errors in Hz from the residual without a window, including transients."""
     bins = _bins(fit.frequencies, fit.rest, floor, rate)
     bare = noise_floor(_densities(fit.rest, runs, rate, "boxcar"), runs)[bins]
     weight = fit.power / floor[bins]
@@ -176,7 +176,7 @@ def _errors(fit: _Fit, rate: float, floor: Floats, runs: int) -> Floats:
 
 def _fit_lines(x: Floats, start: Floats, rate: float, floor: Floats, runs: int) -> _Fit:
     """Return lines fitted together to waveforms (t, r p), weighted by the noise floor (f, p), from
-    frequencies (l,) in Hz that are known to a fraction of a bin.
+    frequencies (l,) in Hz with an error of a fraction of a bin.
     """
     frequencies, limit = start.copy(), LARGEST_STEP * rate / len(x)
     noise = np.tile(floor[_bins(start, x, floor, rate)], (1, runs))

@@ -6,7 +6,8 @@ their covariance is a sandwich (White, Econometrica 48:817 (1980)),
 
     cov a = r/2 1/n sum over k of S(k) F P(k) F P(k)^*,     F the transform of n samples.
 
-S is the floor of the residual of the same fit, over the share of white noise that the fit leaves.
+S is the floor of the residual of the same fit, divided by the share of white noise that remains in
+it.
 """
 
 from dataclasses import dataclass, replace
@@ -39,10 +40,10 @@ class MeasuredLines:
     frequencies : (f,) float, Hz
     each : (r, f, p) complex, aligned repetitions, in the unit of the measurement
     variance : (f, p) float, of the mean: E |mean - true|^2; nan if unknown
-    freedom : float or (f, 1), degrees of freedom of the variance, of real numbers
+    freedom : float or (f, 1), degrees of freedom (real numbers) of the variance
     shifts : (r,) float, s, delays of repetitions that were removed
-    correlation : (2 f, 2 f) float, covariance of the real and then the imaginary parts where every
-        variance is 2; None for independent parts
+    correlation : (2 f, 2 f) float, covariance of all real, then all imaginary parts, scaled to a
+        `variance` of 2; None for independent parts
     """
 
     frequencies: Floats
@@ -75,14 +76,14 @@ class MeasuredLines:
         return float(self.shifts.std(ddof=1) / np.sqrt(r)) if r > 1 else 0.0
 
     def variance_of(self, factors: np.ndarray) -> float:
-        """Return the variance of Re sum(factors (f, p) * mean); unknown noise counts as zero."""
+        """Return the variance of Re sum(factors (f, p) * mean), without unknown noise."""
         parts = np.nan_to_num(self.amplitude_error) * factors.conj()
         parts = np.vstack([parts.real, parts.imag])
         shared = parts if self.correlation is None else self.correlation @ parts
         return float((parts * shared).sum())
 
     def only(self, chosen: np.ndarray) -> "MeasuredLines":
-        """Return the lines of a mask or of indices."""
+        """Return the lines in a mask or at indices."""
         count = len(self.frequencies)
         at = np.arange(count)[chosen]
         both = np.append(at, at + count)
@@ -93,7 +94,7 @@ class MeasuredLines:
         )  # fmt: skip
 
     def radius(self, level: float) -> Floats:
-        """Return the radius (f, p) of the confidence circles of a level around the means."""
+        """Return the radii (f, p) of confidence circles around the means, for a level."""
         half = self.freedom / 2
         return np.sqrt(self.variance * half * ((1 - level) ** (-1 / half) - 1))
 
@@ -110,7 +111,7 @@ class MeasuredLines:
 
 
 def holm(p: Floats) -> Floats:
-    """Return p-values adjusted for their number (Holm 1979); nan stays."""
+    """Return p-values adjusted for their number (Holm 1979); nan remains nan."""
     known = np.flatnonzero(np.isfinite(p.ravel()))
     order = known[np.argsort(p.ravel()[known], kind="stable")]
     adjusted = np.full(p.size, np.nan)
@@ -139,13 +140,13 @@ def bin_width(measurement: Measurement) -> float:
 def lines_of(
     measurement: Measurement, frequencies: Floats, *, settle: float = SETTLE
 ) -> MeasuredLines:
-    """Return the lines of a measurement at frequencies (f,) in Hz, without a fraction `settle` at
-    the start of waveforms.
+    """Return the lines of a measurement at frequencies (f,) in Hz, without the first fraction
+    `settle` of waveforms.
 
-    Their noise is the floor below them. Repetitions add the variance of their mean, weighted by
-    degrees of freedom; if a line's repetitions vary otherwise than the floor (F test at 0.1 %),
-    only that variance counts. Repetitions out of step (F test at 0.1 %) are aligned. Raises a
-    ValueError if a frequency is above half the sampling rate, or not in a spectrum.
+    The noise is estimated from the floor below the lines and from the variance between repetitions,
+    weighted by degrees of freedom; if both differ (F test at 0.1 %), from the latter alone.
+    Repetitions with different delays (F test at 0.1 %) are aligned. Raises a ValueError if a
+    frequency is above half the sampling rate, or not in a spectrum.
     """
     frequencies = np.asarray(frequencies, np.float64)
     missing = frequencies[~measurable(measurement, frequencies)]
@@ -226,7 +227,7 @@ def _of_waveforms(measurement: Measurement, frequencies: Floats, settle: float) 
 
 
 def _select(window: Floats, waves: Floats, rows: Floats) -> Floats:
-    """Return the share (k,) of windowed white noise that a fit leaves at each bin."""
+    """Return the share (k,) of windowed white noise that remains after a fit, at each bin."""
     moved, made = np.fft.rfft(window * rows), np.fft.rfft(window * waves)
     removed = 2 * (made.conj() * moved).real.sum(axis=0)
     added = (made.conj() * ((rows @ rows.T) @ made)).real.sum(axis=0)

@@ -16,7 +16,7 @@ MISSING = 'MATLAB 7.3 files need h5py; pip install "skinwave[measure]", or save 
 
 
 class Unreadable(ValueError):
-    """An array of a kind that only MATLAB reads."""
+    """An array of a kind that only MATLAB can read."""
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:

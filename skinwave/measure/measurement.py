@@ -17,16 +17,16 @@ class Measurement:
 
     Parameters
     ----------
-    quantity : str, name of one of `simple_model.quantities.QUANTITIES`, normal to the body and
-        positive into it
+    quantity : str, name in `simple_model.quantities.QUANTITIES`; normal motion is positive into the
+        body
     places : (p, 2) float, m, in the plane of the body; nan if unknown
     times : (t,) float, s, rising in equal steps; empty for spectra
     frequencies : (f,) float, Hz, rising; empty for waveforms
-    values : (r, t, p) float or, for spectra, (r, f, p) complex, in SI: r repetitions; a spectrum
-        has the complex amplitudes a of Re a exp(2 pi i f t)
+    values : (r, t, p) float or, for spectra, (r, f, p) complex, in SI, for r repetitions; spectra
+        are complex amplitudes a of Re a exp(2 pi i f t)
     drive : (t,) float or (f,) complex, the recorded reference signal in any unit; may be empty
     name, source : str, a title, and the file or publication
-    remarks : sentences on what was missing in the file, or assumed
+    remarks : sentences on missing information and assumptions
 
     Arrays are copied and read-only.
 
@@ -34,7 +34,7 @@ class Measurement:
     ------
     ValueError
         If shapes do not fit, a value is not finite, times are not equally spaced, or the quantity
-        is unknown or not one of a body.
+        is unknown or not that of a body.
 
     >>> t = np.arange(100) / 1000
     >>> values = np.sin(2 * np.pi * 140 * t)[None, :, None]
@@ -118,11 +118,11 @@ class Measurement:
         return f"({x:.4g}, {y:.4g}) mm" if np.isfinite([x, y]).all() else f"place {place + 1}"
 
     def place_names(self, places: np.ndarray) -> str:
-        """Return the names of the first of some places."""
+        """Return the names of the first few of some places."""
         names = ", ".join(self.place_name(int(p)) for p in places[:MOST_NAMED])
         return names + f" and {len(places) - MOST_NAMED} more" * (len(places) > MOST_NAMED)
 
 
 def strongest(size: Floats, most: int) -> np.ndarray:
-    """Return the indices of the places with the largest of sizes (p,), in their order."""
+    """Return the ascending indices of the places with the largest values of `size` (p,)."""
     return np.sort(np.argsort(-size, kind="stable")[:most])

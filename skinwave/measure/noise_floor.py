@@ -18,9 +18,9 @@ CORRELATED = 1 + 2 * (0.28 + 0.016)  # bins under a Hann window per independent 
 def noise_floor(density: Floats, runs: int, kept: Floats | None = None) -> Floats:
     """Return the noise floor (f, p) of densities (f, p), means of `runs` repetitions.
 
-    Where lines were fitted and removed, bins have `kept` a share (f,) of the noise. A parabola
-    through medians of half octaves in logarithms is divided out first, so that noise that falls
-    with frequency has no bias at the ends.
+    `kept` (f,) is the share of noise that remains in each bin after lines were fitted and removed.
+    A parabola through medians of half octaves in logarithms is divided out first, so that noise
+    that falls with frequency has no bias at the ends.
     """
     count = len(density)
     kept = np.ones(count) if kept is None else kept
@@ -54,13 +54,13 @@ def false_alarm(ratio: Floats, runs: int, bins: int) -> Floats:
 
 
 def _noise_bins(kept: Floats) -> np.ndarray:
-    """Return the bins with enough noise: at least half of those around any bin."""
+    """Return the bins with enough remaining noise: at least half of those around any bin."""
     least = np.minimum(LEAST_KEPT, median_filter(kept, 2 * FEWEST + 1))
     return 1 + np.flatnonzero((kept[1:] >= least[1:]) & (kept[1:] > 0))
 
 
 def _bands(knots: np.ndarray, bins: np.ndarray) -> np.ndarray:
-    """Return first and last plus one (k, 2) of the bins around each knot, at least `FEWEST`."""
+    """Return ranges (k, 2) of bins around knots, the last plus one, at least `FEWEST` bins."""
     h = _half_width(knots)
     low, high = (np.searchsorted(bins, edge) for edge in (knots - h, knots + h + 1))
     missing = np.maximum(FEWEST - (high - low), 0)

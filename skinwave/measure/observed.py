@@ -38,7 +38,7 @@ NOISE_CHANCE = 0.01  # p-value of a line, below which it is more than noise
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOutLine:
-    """Line of the load that is weak and unresolved, or that a reduced body leaves out."""
+    """Line of the load that is left out: weak and unresolved, or absent in a reduced body."""
 
     name: str
     frequency: float  # Hz
@@ -69,7 +69,7 @@ class LoadLines:
 
     @property
     def words(self) -> str:
-        """Numbers of lines and places."""
+        """Numbers of lines and places in words."""
         n, p = self.measured.mean.shape
         return f"{plural(n, 'line')} at {plural(p, 'place')}"
 
@@ -98,11 +98,11 @@ class Data:
 
     @property
     def has_sign(self) -> bool:
-        """Whether a measurement with the opposite sign has other values."""
+        """Whether the values depend on the sign of the measurement."""
         return self.kind != "amplitudes"
 
     def whiten(self, values: Floats) -> Floats:
-        """Return values (n, s) in units of their errors, made independent."""
+        """Scale values (n, s) by their errors and decorrelate them."""
         over = values / self.error
         if self.whitening is None:
             return np.asarray(over)
@@ -113,12 +113,12 @@ class Data:
 
 
 def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
-    """Return data of a kind of `KINDS`. Raises a ValueError if the measurement has none."""
+    """Return data of one of the `KINDS`. Raises a ValueError if the measurement has none."""
     return _waveforms(measured, aim) if kind == "waveforms" else _of_lines(kind, measured, aim)
 
 
 def load_lines(measured: Measurement, aim: Target) -> LoadLines:
-    """Return the lines of a load in a measurement, as far as they are predicted."""
+    """Return those lines of a load in a measurement that the model predicts."""
     load, lost = line_names(aim.scene.pressure), dict[str, float]()
     if measured.is_spectrum:
         away = np.abs(measured.frequencies[:, None] - load.frequencies).min(axis=0)
@@ -156,7 +156,7 @@ def _not_predicted(
 
 
 def first_names(names: tuple[str, ...]) -> str:
-    """Return the first of some names, and the number of others."""
+    """Return the first few names, and the number of the others."""
     more = len(names) - MOST_NAMED
     return ", ".join(names[:MOST_NAMED]) + f" and {more} more" * (more > 0)
 
@@ -207,7 +207,7 @@ def _whitening(correlation: Floats) -> Floats:
 
 
 def _waveforms(measured: Measurement, aim: Target) -> Data:
-    """Return steady waveforms, predicted as a sum of lines, or waveforms from rest."""
+    """Return data of waveforms: steady ones, predicted as a sum of lines, or from rest."""
     if measured.is_spectrum:
         raise ValueError("the measurement has spectra; fit lines or amplitudes")
     count = measured.times.size * len(measured.places)
@@ -236,7 +236,7 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
 
 
 def is_steady(measured: Measurement, frequencies: Floats) -> bool:
-    """Whether lines fitted to the later part of waveforms also explain their start."""
+    """Whether lines fitted to the later part of waveforms also describe their start."""
     rest = fit_lines(as_response(measured), frequencies)[1]
     n = int(SETTLE * len(rest))
     start, later = (np.sqrt((part**2).mean()) for part in (rest[:n], rest[n:]))
@@ -278,7 +278,7 @@ def _in_time(
 
 
 def _positive(error: Floats, values: np.ndarray) -> Floats:
-    """Return errors above 0, which repetitions without noise would have."""
+    """Return errors limited to values above 0, for repetitions without noise."""
     least = 1e-9 * float(np.abs(values).max(initial=0.0)) or 1e-300
     return np.asarray(np.maximum(error, least))
 

@@ -1,7 +1,7 @@
 """Parameters of a fit: numeric keys of a scene, and four parameters of the measurement.
 
-A fit works in the unit interval between the limits of each parameter, of its logarithm if both
-limits are above 0.
+Each parameter, or its logarithm if both limits are above 0, is mapped to the unit interval between
+its limits.
 """
 
 import ast
@@ -49,22 +49,22 @@ class Parameter:
 
     @property
     def span(self) -> float:
-        """Distance of the limits, or of their logarithms."""
+        """Distance between the limits, or between their logarithms."""
         return math.log(self.high / self.low) if self.is_log else self.high - self.low
 
     def value(self, u: float) -> float:
-        """Return the value at u of the unit interval."""
+        """Return the value at u in the unit interval."""
         return self.low * math.exp(u * self.span) if self.is_log else self.low + u * self.span
 
     def position(self, value: float) -> float:
-        """Return the position of a value in the unit interval, the nearest if it is outside."""
+        """Return the position of a value in the unit interval, clipped to 0 to 1."""
         value = min(max(value, self.low), self.high)
         return (math.log(value / self.low) if self.is_log else value - self.low) / self.span
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
-    """The `free` parameters of a fit, and expressions of them by key, `ties`."""
+    """The `free` parameters of a fit, and `ties`: expressions of them by key."""
 
     free: tuple[Parameter, ...]
     ties: Mapping[str, str]
@@ -90,7 +90,7 @@ class Parameters:
 
 
 def parse(vary: Sequence[str], tie: Sequence[str] = ()) -> Parameters:
-    """Return the parameters of `KEY=low:high` and `KEY=expression` texts."""
+    """Parse texts `KEY=low:high` and `KEY=expression` into parameters."""
     ties = dict(_tie(text) for text in tie)
     return Parameters(free=tuple(map(_parameter, vary)), ties=ties)
 
@@ -117,7 +117,7 @@ def _key(text: str) -> str:
 
 
 def _tied_value(key: str, expression: str, values: Values) -> float:
-    """Return the value of an expression of other keys."""
+    """Return the value of an expression in terms of other keys."""
     keys = r"(?<![\w.])[A-Za-z_][\w.]*"
     try:
         numbers = re.sub(keys, lambda match: f"({float(values[match[0]])!r})", expression)
@@ -144,7 +144,7 @@ def _evaluate(node: ast.AST) -> float:
 
 
 def of_scene(values: Values) -> dict[str, float]:
-    """Return the values of keys of a scene."""
+    """Return those of the values that are keys of a scene."""
     return {key: value for key, value in values.items() if key not in OF_MEASUREMENT}
 
 

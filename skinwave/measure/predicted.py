@@ -1,7 +1,7 @@
 """Predictions of a model at the places of a measurement, as functions of its parameters.
 
-Linear waves are proportional to the peak pressure, which is then a factor like the gain; with the
-delay, these parameters need no run of the model. The last predictions are cached.
+Linear waves are proportional to the peak pressure, a factor like the gain. Pressure, gain and delay
+need no new run of the model. The last predictions are cached.
 """
 
 from collections.abc import Callable
@@ -50,7 +50,7 @@ WEAKEST = 1e-5  # of the strongest line of the load; weaker ones are not predict
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """A scene that varies, a model, and the quantity at places (p, 2) that it predicts."""
+    """A scene with variable keys, a model, and the quantity that it predicts at places (p, 2)."""
 
     scene: Scene
     model: str
@@ -65,7 +65,7 @@ class Target:
 
     @property
     def linear(self) -> tuple[str, ...]:
-        """Keys to which a prediction is proportional."""
+        """Keys that a prediction is proportional to."""
         load, (key, strength) = self.scene.load, self.strength
         is_linear = not (load.gravity or load.support_motion or self.record.is_nonlinear)
         return (GAIN, key) if strength > 0 and is_linear else (GAIN,)
@@ -78,7 +78,7 @@ class Target:
         return FORCE, self.scene.load.force
 
     def scene_with(self, values: Values) -> Scene:
-        """Return the scene with these values, and probes at the places with their offset."""
+        """Return the scene with these values, and with probes at the places plus their offset."""
         changed = with_values(self.scene, of_scene(values)) if of_scene(values) else self.scene
         offset = np.array([values.get(OFFSET_X, 0.0), values.get(OFFSET_Y, 0.0)]) / 1e3
         places = [(float(x), float(y)) for x, y in self.places + offset]
@@ -91,12 +91,12 @@ class Target:
         return float(values.get(GAIN, 1.0) * relative)
 
     def rest(self, values: Values) -> dict[str, float]:
-        """Return the values of all keys but the delay and the linear ones."""
+        """Return the values of all keys except the delay and the linear keys."""
         left_out = {GAIN, DELAY} | ({self.strength[0]} if self._is_scaled(values) else set())
         return {key: value for key, value in values.items() if key not in left_out}
 
     def predicts(self, frequencies: Floats) -> np.ndarray:
-        """Return a mask (f,) of predicted lines: a reduced body leaves out weak ones."""
+        """Return a mask (f,) of the lines that are predicted; a reduced body omits weak ones."""
         known = frequencies if self.reduced is None else self.reduced.frequencies
         away = np.abs(known[:, None] - frequencies)
         return np.asarray((away <= SAME_LINE * frequencies).any(axis=0))
@@ -106,7 +106,7 @@ class Target:
 
 
 def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Target:
-    """Return the target of a model; a ValueError if the model refuses scene or quantity."""
+    """Return the target of a model; raise a ValueError if it cannot take scene or quantity."""
     if not quantity.is_normal:
         raise ValueError(f"a fit needs motion normal to the body, not {quantity.words}")
     if not np.isfinite(places).all():
@@ -120,7 +120,7 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
 
 
 def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> Target:
-    """Return the target with one reduction of its body, if one covers all ranges."""
+    """Return the target, with a shared reduction of its body if one covers all ranges."""
     ranges = {each.key: (each.low, each.high) for each in parameters.free}
     ranges = {key: ranges[key] for key in aim.rest(dict.fromkeys(ranges, 1.0))}
     if not aim.record.is_reduced or parameters.ties or not ranges:
@@ -131,8 +131,8 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
 
 
 def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
-    """Return the prediction of complex amplitudes (f, p), SI, of Re a exp(2 pi i f t) at
-    frequencies (f,) in Hz. It raises a ValueError if the load has no line at one of them.
+    """Return a function of the values that predicts complex amplitudes (f, p), SI, of Re a exp(2 pi
+    i f t) at frequencies (f,) in Hz. It raises a ValueError if the load has no line at one of them.
     """
     unscaled = _flat_lines if aim.record.is_infinite else _sampled_lines
     unscaled = _reduced_lines if aim.reduced else unscaled
@@ -146,7 +146,7 @@ def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
 
 
 def predicted_waveforms(aim: Target, times: Floats) -> Predict:
-    """Return the prediction of waveforms (t, p) from rest at t = 0, SI, at times (t,) in s."""
+    """Return a function of the values that predicts waveforms (t, p) in SI from rest at t = 0."""
     last, duration = float(times[-1]), aim.scene.tacton.duration
     if last > duration + 1 / SAMPLE_RATE:
         raise ValueError(
@@ -173,7 +173,7 @@ def _from_cache(function: Callable[[Values], Any]) -> Callable[[Values], Any]:
 
 
 def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
-    """Return lines by wavenumber integrals."""
+    """Return lines from wavenumber integrals."""
     f, a = _flat_lines_of(aim.scene_with(values))
     at = np.abs(f[:, None] - frequencies).argmin(axis=0)
     apart = np.abs(f[at] - frequencies) > SAME_LINE * frequencies
@@ -207,7 +207,7 @@ def _reduced_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
 
 
 def _sampled_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
-    """Return lines of the waveforms of any model."""
+    """Return lines fitted to the waveforms of any model."""
     return np.asarray(fit_lines(compute(aim.scene_with(values), aim.model), frequencies)[0])
 
 

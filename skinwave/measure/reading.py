@@ -79,7 +79,7 @@ def read_skinsource(path: Path, given: Given) -> Recording:
 
 @dataclass(frozen=True, kw_only=True)
 class Reader:
-    """File format: its name, suffixes, reader, and the options that choose in such files."""
+    """File format: name, suffixes, reader, and the options that apply to such files."""
 
     name: str
     suffixes: tuple[str, ...]
@@ -130,7 +130,7 @@ def read(path: str | Path, **options: Any) -> Measurement:
 
 
 def read_complete(path: str | Path) -> Measurement:
-    """Return the measurement in a file that needs no options."""
+    """Return the measurement in a file; raise a ValueError if options are needed."""
     try:
         return read(path)
     except ValueError as error:

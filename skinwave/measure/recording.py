@@ -25,7 +25,7 @@ GAP_MARGIN = 8  # samples on both sides of each
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Given:
-    """What a user says of a file. Each value replaces what the file says; None or "" keeps it.
+    """Information from a user. Each value replaces that in the file; None or "" does not.
 
     Parameters
     ----------
@@ -33,9 +33,10 @@ class Given:
     unit : "mm/s", "um", "g", ...; "20 mm/s" if 1 in the file stands for 20 mm/s
     places : (p, 2) float, m
     sign : 1 if positive values are into the body, -1 if out of it
-    rate : Hz, replaces the steps of the file's times; the first sample stays as many steps from 0
+    rate : Hz, replaces the time step of the file; the first sample remains the same number of steps
+        from 0
     variable : name of the array of motion in a file with several
-    columns : headings, or numbers from 1, of the columns or channels of motion
+    columns : headings or numbers, from 1, of the columns or channels of motion
     direction : "x", "y" or "z", the direction of motion in a Universal File
     """
 
@@ -132,7 +133,7 @@ def _places(recording: Recording, given: Given) -> Floats:
 
 
 def _without_empty(recording: Recording, remarks: list[str]) -> Recording:
-    """Return the recording without places and frequencies that have no value."""
+    """Return the recording without empty places and frequencies."""
     missing = np.isnan(recording.values)
     place = ~missing.all(axis=(0, 1))
     if not place.any():
@@ -156,7 +157,7 @@ def _without_empty(recording: Recording, remarks: list[str]) -> Recording:
 def _sample_evenly(
     recording: Recording, given: Given, remarks: list[str]
 ) -> tuple[Floats, Recording]:  # fmt: skip
-    """Return even times, and the recording at each of them without missing samples."""
+    """Return even times, and the recording at these times, with missing samples filled in."""
     if len(recording.frequencies):
         if recording.frequencies.min() < 0:
             raise ValueError("frequencies fall below 0 Hz; export the one-sided spectrum")
@@ -182,7 +183,7 @@ def _sample_evenly(
 
 
 def _times(recording: Recording, given: Given, remarks: list[str]) -> tuple[Floats, np.ndarray]:
-    """Return even times, and the index in them of each sample of the file."""
+    """Return even times, and the index of each sample of the file in them."""
     count = recording.values.shape[1]
     rate = recording.rate if given.rate is None else given.rate
     if given.rate is None and len(recording.times):
@@ -209,7 +210,7 @@ def _times(recording: Recording, given: Given, remarks: list[str]) -> tuple[Floa
 
 
 def _even_times(times: Floats) -> tuple[Floats, np.ndarray]:
-    """Return even times (n,) for rounded ones with missing rows, and the index (t,) of each."""
+    """Return even times (n,) from rounded ones with missing rows, and indices (t,) of rows."""
     largest = float(np.abs(times).max(initial=0.0))
     if largest > LARGEST_TIME:
         times = times - times[0]
@@ -240,7 +241,7 @@ def _even_times(times: Floats) -> tuple[Floats, np.ndarray]:
 
 
 def _complete_part(values: Floats) -> slice:
-    """Return the samples between the first and the last value of every place of (r, n, p)."""
+    """Return the samples between the first and last value that all places of (r, n, p) have."""
     known, count = ~np.isnan(values), values.shape[1]
     if not known.any(axis=1).all():
         raise ValueError("a repetition of a place has no value; choose others by --columns")
@@ -264,7 +265,7 @@ def _interpolate(values: Floats, remarks: list[str]) -> None:
 
 
 def _fill(row: Floats, gap: np.ndarray) -> float:
-    """Fill the gaps of a row; return the error of as long gaps elsewhere, relative to the RMS."""
+    """Fill the gaps of a row; return the relative error of filling equal gaps elsewhere."""
     from scipy.interpolate import CubicSpline  # slow to import
 
     known = np.flatnonzero(~gap)

@@ -1,11 +1,11 @@
 """Weighted least squares within limits, from several starts.
 
 The delay, by a scan of its range, and the gain or the pressure, by linear least squares at each
-delay (Golub and Pereyra, SIAM J Numer Anal 10:413 (1973)), need no run of the model and are set
-first. A trust-region method continues from there. It may end in another minimum, such as a softer
-body whose waves are one period later. Therefore each other parameter is scanned through its range,
-and the search continues from the minima of the scan until none leads lower. Searches use rough data
-if there are any; the best start continues with all data.
+delay (Golub and Pereyra, SIAM J Numer Anal 10:413 (1973)), need no run of the model and are
+determined first. A trust-region method continues from there. It may end in another minimum, such as
+a softer body whose waves are one period later. Therefore each other parameter is scanned through
+its range, and the search continues from the minima of the scan until none leads lower. Searches use
+rough data if there are any; the best start continues with all data.
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ SAME_COST = 1.0  # of twice the log-likelihood, of starts that reached the best 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
-    """Weighted residuals over the unit cube; the model is proportional to `linear` keys."""
+    """Weighted residuals over the unit cube, of a model that is proportional to `linear` keys."""
 
     parameters: Parameters
     data: Data
@@ -61,7 +61,7 @@ class Problem:
         return np.array(columns).T
 
     def forward_slopes(self, u: Floats) -> Floats:
-        """Return the same by differences towards the middle, at half the cost."""
+        """Return the same by one-sided differences, towards the middle, at half the cost."""
         at = self.residual(u)
         steps = np.where(u < 0.5, FORWARD_STEP, -FORWARD_STEP)
         each = (self.residual(u + moved) for moved in np.diag(steps))
@@ -69,7 +69,7 @@ class Problem:
 
     @property
     def rough(self) -> "Problem":
-        """The problem with the rough data, if there are any."""
+        """The problem with rough data, if there are any."""
         return replace(self, data=self.data.rough) if self.data.rough else self
 
 
@@ -107,21 +107,21 @@ class Solution:
 
     @property
     def scale(self) -> float:
-        """Factor of the variances: chi squared over its degrees of freedom, at least 1 for known
-        errors, so that a misfit of the model widens the intervals.
+        """Factor of the variances: chi squared per degree of freedom, at least 1 for known errors,
+        so that a misfit of the model widens the intervals.
         """
         ratio = self.cost / self.dof
         return max(ratio, 1.0) if self.problem.data.is_known else ratio
 
     @property
     def agreeing_starts(self) -> int:
-        """Number of starts that ended at the best chi squared."""
+        """Number of starts that ended with the best chi squared."""
         best = self.starts[0].cost
         return sum(start.cost - best <= SAME_COST * self.scale for start in self.starts)
 
 
 def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solution:
-    """Return the best of several starts, which a Latin hypercube spreads between the limits."""
+    """Return the best result of several starts, from a Latin hypercube between the limits."""
     k, count = len(problem.parameters.free), problem.data.values.size
     if starts < 1:
         raise ValueError(f"{starts} starts are too few; give at least 1")
@@ -143,7 +143,7 @@ def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solut
 
 
 def _may_be_flipped(problem: Problem, best: Start, candidates: Floats) -> bool:
-    """Whether the measurement with the opposite sign fits better, or with a smaller delay."""
+    """Whether the opposite sign of the measurement fits better, or with a smaller delay."""
     data, parameters = problem.data, problem.parameters
     linear = [each for each in parameters.free if each.key in problem.linear]
     values = parameters.values(best.ended)
@@ -158,7 +158,7 @@ def _may_be_flipped(problem: Problem, best: Start, candidates: Floats) -> bool:
 
 
 def search(problem: Problem, starts: Sequence[Floats], progress: Progress) -> list[Start]:
-    """Return the results of several starts in their order, each with candidates (c, k)."""
+    """Return the results of several starts, in order, each with candidates (c, k)."""
     results: list[Start] = []
     minima: list[tuple[Start, Start]] = []  # each with the one that its scans lead to
     for n, candidates in enumerate(starts):
@@ -175,7 +175,7 @@ def search(problem: Problem, starts: Sequence[Floats], progress: Progress) -> li
 
 
 def descend(problem: Problem, local: Start) -> Start:
-    """Return the lowest minimum that scans of one parameter after the other lead to."""
+    """Return the lowest minimum that scans of one parameter after another lead to."""
     for _ in range(MOST_HOPS):
         lower = _lower(problem, local)
         if lower is None:
@@ -185,7 +185,7 @@ def descend(problem: Problem, local: Start) -> Start:
 
 
 def _lower(problem: Problem, local: Start) -> Start | None:
-    """Return a lower minimum near one of a scan, if there is any."""
+    """Return a lower minimum near a minimum of a scan, if there is any."""
     for k, key in enumerate(problem.parameters.keys):
         if key in (DELAY, *problem.linear):
             continue
@@ -212,7 +212,7 @@ def _scan_minima(problem: Problem, local: Start, k: int) -> list[Floats]:
 def refine(
     problem: Problem, u: Floats, most: int = MOST_EVALUATIONS, tolerance: float = ROUGH_TOLERANCE
 ) -> Start:
-    """Return the local search from a point (k,) to a relative tolerance of chi squared."""
+    """Search locally from a point (k,) to a relative tolerance of chi squared."""
     result = least_squares(
         problem.residual, np.clip(u, 1e-6, 1 - 1e-6), problem.forward_slopes, bounds=(0, 1),
         x_scale="jac", xtol=1e-8, ftol=tolerance, gtol=1e-8, max_nfev=most,
@@ -239,7 +239,7 @@ def _with_cheap_parameters(problem: Problem, u: Floats) -> tuple[float, Floats]:
 
 
 def _delays(problem: Problem, at: int) -> list[float]:
-    """Return positions of delays that resolve the periods of the data."""
+    """Return positions of delays, close enough to resolve the periods of the data."""
     delay, data = problem.parameters.free[at], problem.data
     highest = 0.1 / np.diff(data.axis).min() if data.is_in_time else data.axis.max()
     count = int(np.ceil(DELAYS_PER_PERIOD * highest * (delay.high - delay.low) / 1e3)) + 2
@@ -247,7 +247,7 @@ def _delays(problem: Problem, at: int) -> list[float]:
 
 
 def _with_factor(problem: Problem, u: Floats, at: int | None) -> tuple[float, Floats]:
-    """Return chi squared and the point with the linear parameter `at`, if any, of least squares."""
+    """Return chi squared and the point, with the best linear parameter at index `at`, if any."""
     data = problem.data
     predicted, values = data.whiten(problem.predict(u)), data.whiten(data.values)
     factor = 1.0

@@ -1,7 +1,7 @@
 """Recordings from tables: wide ones with a column per place, long ones with a row per place.
 
-Headings say which columns are times, frequencies, motion and drive. What they leave open follows
-from the numbers, and a remark says so.
+Headings say which columns are times, frequencies, motion and drive. Missing information is inferred
+from the numbers, with a remark.
 """
 
 import re
@@ -114,7 +114,7 @@ def recording_of(table: Table, given: Given) -> Recording:
 
 
 def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
-    """Return the table of the columns to keep, with roles from their numbers, and remarks."""
+    """Return the table of relevant columns, with roles inferred from their numbers, and remarks."""
     numbers, remarks = _rows(table), []
     columns = [replace(column, unit=per_reference(column.unit)[0]) for column in table.columns]
     if any(per_reference(column.unit)[1] for column in table.columns):
@@ -168,7 +168,7 @@ def _counts(numbers: Floats) -> bool:
 
 
 def rises(numbers: Floats) -> bool:
-    """Whether numbers rise as times do: evenly up to rounding, or in every step."""
+    """Whether numbers rise like times: evenly except for rounding, or in every step."""
     if len(numbers) < FEWEST_ROWS or not np.isfinite(numbers).all() or np.diff(numbers).min() < 0:
         return False
     span = float(np.ptp(numbers))
@@ -179,7 +179,7 @@ def rises(numbers: Floats) -> bool:
 
 
 def _one_time(columns: list[Column], numbers: Floats) -> list[Column]:
-    """Return columns with one of times; constants, such as dates, and copies do not count."""
+    """Return columns with a single one of times; constants, such as dates, are dropped."""
     times = [k for k, column in enumerate(columns) if column.role == TIME]
     if len(times) < 2:
         return columns
@@ -196,7 +196,7 @@ def _one_time(columns: list[Column], numbers: Floats) -> list[Column]:
 
 
 def _choose_columns(columns: list[Column], wanted: tuple[str, ...]) -> list[int]:
-    """Return indices of columns that a user names by heading or by number from 1."""
+    """Return indices of columns that a user names by heading or number, from 1."""
     chosen = []
     for name in wanted:
         names = [column.text.lower() for column in columns]
@@ -212,7 +212,7 @@ def _choose_columns(columns: list[Column], wanted: tuple[str, ...]) -> list[int]
 
 
 def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int]:
-    """Return the columns to keep; next to units of motion, one in another unit is the drive."""
+    """Return the relevant columns; a single one with a unit of another kind is the drive."""
     motion = [k for k, column in enumerate(columns) if column.may_be_motion]
     known = [k for k in motion if quantity_of(columns[k].unit)]
     bare = [k for k in motion if k not in known and np.isnan(columns[k].place[0])]
@@ -302,7 +302,7 @@ def _complex(table: Table, first: int, second: int) -> np.ndarray:
 
 
 def _common(series: Series, attribute: str, given: str) -> str:
-    """Return the role or unit that columns of motion share; "" if unknown."""
+    """Return the common role or unit of columns of motion; "" if unknown."""
     values = {getattr(column, attribute) for column, _ in series} - {""}
     is_mixed = attribute == "unit" and not all(map(quantity_of, values))
     if len(values) > 1 and (is_mixed or not given):
@@ -352,7 +352,7 @@ def _distinct(points: Floats) -> tuple[Floats, np.ndarray]:
 
 
 def _arrange(values: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
-    """Return values (r, n, p) from rows with these indices."""
+    """Return values (r, n, p) from rows with given indices."""
     shape = tuple(int(k.max()) + 1 for k in at)
     total = int(np.prod(shape, dtype=object))
     flat, row = np.unique(np.ravel_multi_index(at, shape), return_index=True)

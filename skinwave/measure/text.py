@@ -1,8 +1,8 @@
 """Text tables as instruments and programs export them.
 
 The last rows of a file show the delimiter, the decimal sign and the columns of numbers. The table
-begins at the first row with numbers in these columns. The line above has the names, or the units
-below a line of names. All other lines, and cells outside these columns, are notes.
+begins at the first row with numbers in these columns. The line above has names, or units below
+another line with names. All other lines, and cells outside these columns, are notes.
 """
 
 import csv
@@ -58,7 +58,7 @@ def read_places(path: Path) -> Floats:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Delimiter, decimal commas or not, indices of columns of numbers, cells in a row."""
+    """Delimiter, whether commas are decimal, indices of columns of numbers, cells per row."""
 
     delimiter: str
     has_commas: bool
@@ -148,7 +148,7 @@ def _cells(line: str, delimiter: str, has_commas: bool = False) -> list[str]:
 
 
 def _with_point(cell: str) -> str:
-    """Return a number with a decimal comma with a point, other cells unchanged."""
+    """Return a number with its decimal comma replaced by a point, and other cells unchanged."""
     pointed = cell.replace(",", ".")
     return pointed if "." not in cell and number_in(pointed) is not None else cell
 
@@ -217,7 +217,7 @@ def _header(above: list[str], layout: _Layout) -> tuple[list[str], list[str], No
 def _columns(
     names: list[str], units: list[str], layout: _Layout, first: list[str], notes: Notes
 ) -> list[Column]:
-    """Return the columns of numbers; leave out text, or refuse it under a heading of numbers."""
+    """Return the columns of numbers; skip text, but refuse it if the heading implies numbers."""
     for k, cell in enumerate(first[: len(names)]):
         if k in layout.numeric or not (names[k] and cell) or _is_number(cell):
             continue
@@ -229,7 +229,7 @@ def _columns(
 
 
 def _is_title(cells: list[str], count: int) -> bool:
-    """Whether the cells above a table of `count` columns are not their names."""
+    """Whether the cells above a table of `count` columns are a title, not names."""
     if len(cells) == 1 and count > 1:
         column = parse_heading(cells[0])
         return not (column.role or column.unit)

@@ -1,6 +1,6 @@
 """Units of motion, time, frequency and length.
 
-A unit is stored as a divisor: a value in mm/s over 1000 is in m/s, correctly rounded.
+A unit is stored as a divisor: a value in mm/s divided by 1000 is in m/s, correctly rounded.
 """
 
 import re
@@ -53,7 +53,7 @@ def canonical(unit: str) -> str:
 
 
 def per_reference(unit: str) -> tuple[str, bool]:
-    """Return the unit of motion in a unit such as "(m/s)/N", and whether it is per a reference."""
+    """Return the unit of motion in a unit such as "(m/s)/N", and whether there is a reference."""
     unit = re.sub(r"\(1/(\w+)\)\*(\(.*\))", r"\2/\1", unit)
     above, _, below = unit.strip("[] ").rpartition("/")
     if canonical(below) in ("N", "V", "Pa") and quantity_of(above):
@@ -88,7 +88,7 @@ def motion_divisor(unit: str, quantity: str) -> float:
 
 
 def in_si(values: np.ndarray, divisor: float) -> np.ndarray:
-    """Return values over a divisor, with one rounding."""
+    """Return values divided by a divisor, with one rounding."""
     return values / divisor if divisor >= 1 else values * (1 / divisor)
 
 

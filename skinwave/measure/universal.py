@@ -87,7 +87,7 @@ def read(path: Path, given: Given) -> Recording:
 
 
 def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], float]:
-    """Return functions, coordinates by node, and units of length in a metre."""
+    """Return functions, coordinates by node, and the number of units of length per metre."""
     try:
         import pyuff
     except ImportError:
@@ -147,7 +147,7 @@ def _function(one: dict[str, Any]) -> Function:
 
 
 def _motion(functions: list[Function], given: Given) -> tuple[list[Function], list[Function]]:
-    """Return functions of motion with a phase along the direction, and the others."""
+    """Return functions of motion along the direction, with phase, and all others."""
     with_phase = [f for f in functions if f.type in (GENERAL, IN_TIME, RESPONSE, SPECTRUM)]
     if not with_phase:
         raise ValueError(f"functions of type {functions[0].type} have no phase; export spectra")
@@ -173,7 +173,7 @@ def _motion(functions: list[Function], given: Given) -> tuple[list[Function], li
 
 
 def _check_alike(motion: list[Function]) -> None:
-    """Refuse functions that differ in quantity, unit, type, times or frequencies."""
+    """Raise a ValueError if functions differ in quantity, unit, type, times or frequencies."""
     first = motion[0]
     step = 1e-3 * abs(first.x[1] - first.x[0])
     for one in motion[1:]:
@@ -187,7 +187,7 @@ def _check_alike(motion: list[Function]) -> None:
 
 
 def _by_node(motion: list[Function]) -> list[tuple[int, list[Function]]]:
-    """Return nodes with equally many functions; functions of distinct names are places."""
+    """Return nodes with equal numbers of functions; functions with distinct names are places."""
     groups: dict[int, list[Function]] = {}
     for one in motion:
         groups.setdefault(one.node, []).append(one)

@@ -40,9 +40,9 @@ class Limit:
 
     Parameters
     ----------
-    why : str, what the model needs, after its name: "needs a flat sheet, not a curled one"
-    cure : str, how to change the scene, in the imperative; "" if no change helps
-    change : function of the scene to the changed scene
+    why : str, continues the model's name: "needs a flat sheet, not a curled one"
+    cure : str, change of the scene in the imperative; "" if no change helps
+    change : function of the scene that returns the changed scene
     """
 
     why: str
@@ -56,17 +56,18 @@ class Model:
 
     Parameters
     ----------
-    name, label : str, in commands and tables; in legends
-    method : str, what is computed, in a few words for plans
-    words : str, what it computes and leaves out, one clause for pages
-    solve : function of a scene, times (t,) in s equally spaced from 0, and options to the response
-    limits : function of a scene with a body to each `Limit` that it exceeds; by default the model
-        computes only the displacement of the surface under a pressure
-    error : function of scene and element size in m to the expected relative error, nan if unknown;
-        None for linear waves, whose error a plan estimates
-    default_size : function of a body to its element size in m; None without a mesh
-    seconds, memory : predicted cost of a first response in s and bytes, unless a plan measures it
-    colour : str, of figures
+    name, label : str, for commands and tables, and for legends
+    method : str, a few words for plans
+    words : str, a clause for pages: what it computes and leaves out
+    solve : function of a scene, times (t,) in s equally spaced from 0, and options; returns the
+        response
+    limits : function of a scene with a body that yields each `Limit` that it exceeds; by default
+        the model computes only the displacement of the surface under a pressure
+    error : function of scene and element size in m that returns the expected relative error, or
+        nan; None for linear waves, whose error a plan estimates
+    default_size : function of a body that returns its element size in m; None without a mesh
+    seconds, memory : predicted cost of a first response, s and bytes, unless a plan measures it
+    colour : str, for figures
     sources : tuple of str, references of its method
     quantity : str, name of a quantity that it always computes, such as pressure; or ""
     needs_body : bool
@@ -75,7 +76,7 @@ class Model:
     from_rest : str, name of the model from rest, for a model of the steady state; or ""
     is_stepped : bool, whether its error depends on a time step
     is_nonlinear : bool, whether it includes large deflections
-    takes_series : function of a body, whether it replaces modulus laws by Prony series
+    takes_series : function of a body: whether Prony series replace its modulus laws
     """
 
     name: str
@@ -109,7 +110,7 @@ _MODELS: dict[str, Model] = {}
 
 
 def register(model: Model) -> Model:
-    """Register a model, so that scenes can be computed by its name.
+    """Register a model under its name.
 
     Raises
     ------
@@ -128,7 +129,7 @@ def names() -> tuple[str, ...]:
 
 
 def named(name: str) -> Model:
-    """Return the model of a name.
+    """Return the model with a name.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Bodies that share one reduction: one decision for sweeps, samples and fits.
 
 A parametric reduced-order model (`parametric`) serves all bodies of a scene whose materials and
-thicknesses lie within ranges. It costs some factorisations and many vectors, so that it needs a
-minimum number of bodies to be worthwhile.
+thicknesses lie within ranges. It costs some factorisations and many vectors, so that it is
+worthwhile only for many bodies.
 """
 
 from collections.abc import Mapping
@@ -23,9 +23,9 @@ SHARE = 1 / 5  # of a tolerance, for the reduced-order model
 
 @dataclass(frozen=True, kw_only=True)
 class Covering:
-    """Bodies that one reduced-order model serves: those of a `scene` with free keys within
-    `ranges`, each a key, its least and its largest value. `members` is their number, and `hardest`
-    the body with the shortest waves.
+    """Bodies that share a reduced-order model: those of a `scene` with free keys within `ranges`,
+    (key, lowest value, highest value). `members` is their number, and `hardest` the body with the
+    shortest waves.
     """
 
     scene: Scene
@@ -45,11 +45,12 @@ def covering(
     tolerance: float = 0.05,
     hardest: Body | None = None,
 ) -> Covering | None:
-    """Return the bodies of a scene for one reduction; None if one reduction for each of `members`
-    bodies costs less, or the keys cannot be free.
+    """Return the bodies of a scene that share a reduction; None if separate reductions of `members`
+    bodies cost less, or if the keys cannot be free.
 
-    `free` has the least and largest value of each key, in the file's unit; `tolerance` is the
-    relative error of responses; `hardest` the body with the shortest waves, by default the scene's.
+    `free` has the lowest and highest value of each key, in the unit of the file. `tolerance` is the
+    relative error of responses. `hardest` is the body with the shortest waves, by default that of
+    the scene.
     """
     plain = replace(scene, spreads=())
     try:
@@ -64,7 +65,7 @@ def covering(
 
 
 def shared_body(bodies: Covering, options: SolveOptions) -> ParametricBody:
-    """Return the reduced-order model of all bodies; raises if their ranges are too wide for one."""
+    """Return the reduced-order model of all bodies, or raise if their ranges are too wide."""
     free = {key: (low, high) for key, low, high in bodies.ranges}
     within = min(parametric.TOLERANCE, SHARE * options.tolerance)
     return parametric.prepare(
@@ -74,12 +75,12 @@ def shared_body(bodies: Covering, options: SolveOptions) -> ParametricBody:
 
 @lru_cache(maxsize=4)
 def cached_shared_body(bodies: Covering, h: float, tolerance: float, solver: str) -> ParametricBody:
-    """Return the same; a process keeps the last few."""
+    """Return the same; each process keeps the last few."""
     return shared_body(bodies, SolveOptions(h=h, tolerance=tolerance, solver=solver))
 
 
 def try_shared_body(bodies: Covering | None, options: SolveOptions) -> ParametricBody | None:
-    """Return the same, or None without bodies or if their ranges are too wide for one model."""
+    """Return the same; None if there are no bodies or their ranges are too wide."""
     try:
         return shared_body(bodies, options) if bodies else None
     except (ValueError, fem.Diverged):

@@ -37,8 +37,8 @@ Solve = Callable[[Scene, Floats, SolveOptions], Response]
 
 
 def _solver(model: str, normal: Callable[..., Response], history: Callable[..., Floats]) -> Solve:
-    """Return the function that solves a scene: by `normal` for the normal displacement under a
-    pressure, and otherwise by the `history` of components at the probes of each depth.
+    """Return the function that solves a scene: with `normal` for normal displacement under a
+    pressure, otherwise with the `history` of components at the probes of each depth.
     """
 
     def solve(scene: Scene, times: Floats, options: SolveOptions) -> Response:
@@ -62,7 +62,7 @@ def _solver(model: str, normal: Callable[..., Response], history: Callable[..., 
 
 
 def fields_read(scene: Scene, depth: float) -> tuple[Field, ...]:
-    """Return the fields of the quantity that a scene reads, one for each component of its load."""
+    """Return the fields of a scene's quantity, one for each component of its load."""
     if scene.load.is_plain:
         return (field_read(scene, depth),)
     upright = scene.load.tractions(np.array([[0.0, 0.0, 1.0]]))[:, 0]
@@ -71,7 +71,7 @@ def fields_read(scene: Scene, depth: float) -> tuple[Field, ...]:
 
 
 def field_read(scene: Scene, depth: float) -> Field:
-    """Return the field under a pressure of the quantity that a scene reads, at a depth in m."""
+    """Return the field of a scene's quantity under a pressure, at a depth in m."""
     if scene.body.of_kind.is_layer:
         return quantity_field(scene.reading.record, stack(scene.body), depth)
     return surface_field(scene.reading.record, compliance(scene.body))
@@ -119,7 +119,7 @@ def _steady_limits(scene: Scene) -> Iterator[Limit]:
 
 
 def _with_loss(scene: Scene) -> Scene:
-    """Return the scene with a loss tangent of a tenth at 100 Hz."""
+    """Return the scene with a loss tangent of 0.1 at 100 Hz."""
     viscosity = 0.1 * scene.body.solid.shear_modulus / (2 * np.pi * 100)
     return of_part("solid", viscosity=viscosity)(scene)
 

@@ -1,13 +1,13 @@
-"""Bodies of a range: their materials by part of the body, and the geometries between which the
-matrices of one moved mesh are interpolated.
+"""Bodies of a range: their materials by part, and the geometries of one moved mesh between which
+matrices are interpolated.
 
 If nodes move in proportion to the thickness d_k of their layer, each matrix of a body is a sum
 
     A(d) = A_0 + sum_k (d_k B_k + C_k / d_k)
 
-of as many terms as there are independent functions 1, d_k and 1/d_k. As many geometries give it for
-all d to round-off. An error of 1e-4 would be too large, because lam is 5,000 times mu in soft
-tissue.
+with as many terms as there are independent functions 1, d_k and 1/d_k. The same number of
+geometries determines it for all d to round-off. An error of 1e-4 would be too large, because lam is
+5,000 times mu in soft tissue.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,13 +35,12 @@ INDEPENDENT = 1e-9  # of the largest pivot: functions with smaller ones are sums
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Range:
-    """Bodies of a range: function `body` of shares (k,), 0 to 1. The body at the shares `meshed`
-    (k,) is meshed with elements of `h` in m, or its default size, and its nodes are `moved` to the
-    thicknesses of others.
+    """Bodies of a range: a function `body` of shares (k,), 0 to 1. The body at shares `meshed` (k,)
+    is meshed with elements of `h` in m, or its default size; `moved` moves its nodes to other
+    thicknesses.
 
-    Matrices are sums over `_terms` of the thicknesses. They are assembled at the shares
-    `geometries` (g, k), where the independent terms, of index `chosen` (g,), have the values
-    `known` (g, g).
+    Matrices are sums over `_terms` of the thicknesses. They are assembled at shares `geometries`
+    (g, k), where the independent terms, with indices `chosen` (g,), have the values `known` (g, g).
     """
 
     body: Callable[[Sequence[float]], Body]
@@ -59,9 +58,9 @@ def range_of(
     thicknesses: Sequence[bool],
     h: float | None,
 ) -> Range:
-    """Return the range of a function `body` of shares (k,), some of which are of `thicknesses`
-    (k,), with the geometries between which matrices are interpolated. Raises a ValueError if no
-    mesh can be moved over the range.
+    """Return the range of a function `body` of shares (k,), with the geometries between which
+    matrices are interpolated; `thicknesses` (k,) marks shares of thicknesses. Raises a ValueError
+    if no mesh can be moved over the range.
     """
     reference, free = body(meshed), np.array(thicknesses)
     kind, moved = reference.of_kind, None
@@ -93,7 +92,7 @@ def geometry_shares(bodies: Range, body: Body) -> Floats:
 
 
 def nearest_geometry(bodies: Range, at: Sequence[float]) -> tuple[float, ...]:
-    """Return shares (k,) with the same materials at the nearest assembled geometry."""
+    """Return the shares (k,) with the same materials at the nearest assembled geometry."""
     geometries = np.array(bodies.geometries)
     moved = np.ptp(geometries, axis=0) > 0
     k = int(np.argmin(np.linalg.norm((geometries - at)[:, moved], axis=1)))
@@ -116,9 +115,8 @@ def _terms(body: Body) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reference:
-    """Body that was meshed: the `parts` (r,) of its materials, the factors (r, 2) on modulus and
-    density of a mesh that represents a thinner body, and whether it rests on springs that scale
-    with its modulus.
+    """Meshed body: the `parts` (r,) with its materials, factors (r, 2) on modulus and density if
+    its mesh represents a thinner body, and whether it rests on springs that scale with its modulus.
     """
 
     body: Body
@@ -129,7 +127,7 @@ class Reference:
 
 def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference:
     """Return the reference of a meshed body with free keys. Raises a ValueError if a free layer is
-    merged with the next, or the body rests on springs of both kinds.
+    merged with the next, or if the body rests on both kinds of springs.
     """
     tops = np.cumsum([0.0, *(layer.thickness for layer in body.layers)])
     starts = [start for start, _ in body.strata]
@@ -177,7 +175,7 @@ def affine_operators(body: Body, build: Build) -> AffineOperators:
 
 
 def solids_of(reference: Reference, body: Body) -> Solids:
-    """Return the materials of a body of the range for the mesh of the reference."""
+    """Return the materials of another body of the range, for the mesh of the reference."""
     own = [solid_at(body, part) for part in reference.parts]
     bodies = (reference.body, body)
     springs = [_spring_modulus(each) for each in bodies] if reference.is_sprung else [1.0, 1.0]
@@ -194,7 +192,7 @@ def solids_of(reference: Reference, body: Body) -> Solids:
 
 
 def _spring_modulus(body: Body) -> float:
-    """Return the modulus in Pa of the springs below a body; for a half-space the one at rest."""
+    """Return the modulus in Pa of the springs below a body; for a half-space that at rest."""
     if body.is_on_half_space:
         return body.solid.shear_modulus
     # Independent of the Prony series of a modulus law, which takes time to fit.
@@ -202,7 +200,7 @@ def _spring_modulus(body: Body) -> float:
 
 
 def _factors(meshed: Material, solid: Material) -> tuple[float, float]:
-    """Return modulus and density of a mesh's material over those of the body's."""
+    """Return the ratios of modulus and density of a mesh's material to those of the body."""
     modulus = meshed.shear_modulus / solid.shear_modulus
     density = meshed.density / solid.density
     expected, one = _times(solid, modulus, density), complex(meshed.complex_modulus(1e3))
@@ -215,7 +213,7 @@ def _factors(meshed: Material, solid: Material) -> tuple[float, float]:
 
 
 def _times(solid: Material, modulus: float, density: float) -> Material:
-    """Return a material with factors on all moduli and on the density."""
+    """Return a material with all moduli and the density multiplied by factors."""
     if modulus == density == 1:
         return solid
     return replace(solid.scaled(modulus=modulus), density=density * solid.density)

@@ -1,6 +1,6 @@
-"""Free keys of a body: their ranges, and the bodies that their values make.
+"""Free keys of a body: their ranges, and the bodies for their values.
 
-A body with free keys is reduced once, by a sum of matrices with weights that depend on the keys.
+A body with free keys is reduced once, as a sum of matrices whose weights depend on the keys.
 """
 
 import re
@@ -43,8 +43,8 @@ Part = int | str | None  # of a body: a layer, a region by its name, or the rest
 @dataclass(frozen=True, kw_only=True)
 class FreeKey:
     """Number of a body that is free from `low` to `high`: its `key` in a scene file, the `part` of
-    the body, the `path` in the material's table, one of `SCALES`, or `THICKNESS`; and whether the
-    mesh `moves` with it.
+    the body, its `path` (in the material's table, or one of `SCALES`, or `THICKNESS`), and whether
+    the mesh `moves` with it.
     """
 
     key: str
@@ -55,7 +55,7 @@ class FreeKey:
     moves: bool = False
 
     def at(self, share: float) -> float:
-        """Return the value at a share 0 to 1 of the range, on a logarithmic scale if low > 0."""
+        """Return the value at a share, 0 to 1, of the range; logarithmic if low > 0."""
         if self.low > 0:
             return float(self.low * (self.high / self.low) ** share)
         return float(self.low + share * (self.high - self.low))
@@ -94,7 +94,7 @@ def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
 
 
 def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> Body:
-    """Return the body with values of its free keys; raises a ValueError if one is out of range."""
+    """Return the body for values of its free keys; raises a ValueError if one is out of range."""
     if unknown := sorted(set(values) - {key.key for key in keys}):
         raise ValueError(
             f"'{unknown[0]}' is not free; remove it, or free it in addition to "
@@ -116,7 +116,7 @@ def values_at(keys: Sequence[FreeKey], shares: Sequence[float]) -> dict[str, flo
 
 
 def training_shares(count: int, inside: int) -> Floats:
-    """Return shares (t, count) of corners, the middle, and points `inside` of a unit cube."""
+    """Return shares (t, count): corners and middle of the unit cube, and `inside` points in it."""
     corners = np.array(list(product((0.0, 1.0), repeat=count)))
     if len(corners) > MOST_CORNERS:
         corners = np.random.default_rng(0).choice(corners, MOST_CORNERS, replace=False)
@@ -131,7 +131,7 @@ def training_shares(count: int, inside: int) -> Floats:
 def meshing_shares(keys: Sequence[FreeKey]) -> tuple[float, ...]:
     """Return the shares (k,) of the ranges at which the body is meshed: the largest thicknesses,
     and the fastest shear waves below all layers, for which an absorbing layer is widest. Layers
-    with the same range differ, so that they have elements of their own.
+    with equal ranges get different shares, so that they are not merged.
     """
     fastest = {"shear_modulus_pa": 1.0, MODULI: 1.0, "density_kg_m3": 0.0}
     inside = [0.4 + 0.2 * k / len(keys) for k in range(len(keys))]
@@ -263,7 +263,7 @@ def _with_material(body: Body, part: Part, solid: Material) -> Body:
 
 
 def has_affine_operators(body: Body) -> bool:
-    """Whether the operators of a body are sums over its materials, as those of a plain sheet."""
+    """Whether the operators of a body are sums over its materials, as for a plain sheet."""
     return body.mounting == FRAME and body.solid.orthotropy is None
 
 
@@ -304,7 +304,7 @@ def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None
 
 
 def _check_reading(scene: Scene, keys: Sequence[FreeKey]) -> None:
-    """Raise a ValueError for a quantity that depends on a free key other than by the motion."""
+    """Raise a ValueError for a quantity that depends on a free key not only through the motion."""
     quantity, solid, words = scene.reading.record, scene.body.solid, scene.reading.words
     is_thick = any(key.is_thickness for key in keys)
     if is_thick and scene.body.of_kind.equivalent and not quantity.is_normal:

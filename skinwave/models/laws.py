@@ -34,7 +34,7 @@ def has_table(body: Body) -> bool:
 
 def check_laws(body: Body, pressure: MovingPressure) -> None:
     """Raise a ValueError for a modulus law that is not passive or not causal, or a table that does
-    not cover the strong lines of the load, the mean excepted, to within an octave below.
+    not cover the strong lines of the load, except the mean; below them an octave may be missing.
     """
     for solid in own_laws(body):
         solid.series()
@@ -57,12 +57,12 @@ def slowest_and_fastest(pressure: MovingPressure) -> tuple[float, float]:
 
 
 def series_tolerance(tolerance: float) -> float:
-    """Return the relative error of a Prony series for that of a waveform."""
+    """Return the relative error of a Prony series that a waveform's `tolerance` permits."""
     return min(FIT_TOLERANCE, SERIES_SHARE * tolerance)
 
 
 def relaxing(body: Body, tolerance: float) -> Body:
-    """Return the body with Prony series for its modulus laws, within a relative error."""
+    """Return the body with Prony series in place of modulus laws, within a relative error."""
     if not has_own_law(body):
         return body
 

@@ -1,7 +1,7 @@
-"""Limits of models, the changes of a scene that meet them, and refusals.
+"""Limits of models, changes of a scene that satisfy them, and refusals.
 
-A model lists the `Limit`s that a scene exceeds, and takes the scene if there are none. A refusal
-names only models that take the scene, and changes after which a model takes it.
+A model lists the `Limit`s that a scene exceeds. It takes the scene if there are none. A refusal
+names only models that take the scene, and changes after which a model does.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -28,7 +28,7 @@ MOST_CURES = 2  # in one sentence
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cure:
-    """Cure of a refusal: a `scene` that the `model` takes, and the change in words, "" if none."""
+    """Cure of a refusal: a `scene` that the `model` takes, and its change in words, or ""."""
 
     words: str
     scene: Scene
@@ -36,7 +36,7 @@ class Cure:
 
 
 class Refused(ValueError):
-    """Raised for a scene that a model does not take; `cures` are those of the message."""
+    """Raised for a scene that a model does not take; the message names the `cures`."""
 
     def __init__(self, message: str, cures: Sequence[Cure] = ()) -> None:
         super().__init__(message)
@@ -61,7 +61,7 @@ def takers(scene: Scene) -> list[str]:
 
 
 def _candidates(scene: Scene) -> list[Model]:
-    """Return the models of a scene's quantity that do not leave out reflecting sides."""
+    """Return the models for a scene's quantity that include any reflecting sides."""
     has_body = bool(scene.body.of_kind.discretise)
     bounded = has_body and not is_laterally_infinite(scene.body)
     every = (named(name) for name in dict.fromkeys((*ADVISED, *names())))
@@ -101,7 +101,7 @@ def no_model(scene: Scene) -> Refused:
 
 
 def cures_for(scene: Scene, model: Model) -> list[Cure]:
-    """Return how a model can take a scene: unchanged, or by a change if one helps."""
+    """Return how a model can take a scene: as it is, or after a change, if one helps."""
     if takes(model, scene):
         return [Cure(words="", scene=scene, model=model.name)]
     return [*_changes(scene, model, beyond(model, scene))]
@@ -125,7 +125,7 @@ def _reason(model: Model, limits: Sequence[Limit]) -> str:
 
 
 def _any_cures(scene: Scene) -> list[Cure]:
-    """Return changes of a scene after which one of the models takes it."""
+    """Return changes of a scene after which any model takes it."""
     cures: dict[str, Cure] = {}
     for model in _candidates(scene):
         for cure in _changes(scene, model, beyond(model, scene)):
@@ -134,7 +134,7 @@ def _any_cures(scene: Scene) -> list[Cure]:
 
 
 def _changes(scene: Scene, model: Model, limits: Sequence[Limit]) -> Iterator[Cure]:
-    """Yield the change of a scene that meets all limits of a model, if there is one."""
+    """Yield the change of a scene that satisfies all limits of a model, if there is one."""
     changed = scene
     try:
         for limit in limits:
@@ -154,12 +154,12 @@ def _with_cures(reason: str, cures: Sequence[Cure], requested: str) -> Refused:
 
 
 def of_body(**values: Any) -> Callable[[Scene], Scene]:
-    """Return the change of a scene to other attributes of its body."""
+    """Return a function that changes attributes of a scene's body."""
     return lambda scene: replace(scene, body=replace(scene.body, **values))
 
 
 def of_part(part: str, **values: Any) -> Callable[[Scene], Scene]:
-    """Return the change of a scene to other attributes of its `solid`, mounting or placement."""
+    """Return a function that changes attributes of a scene's `solid`, mounting or placement."""
     name = "material" if part == "solid" else part
     return lambda scene: of_body(**{name: replace(getattr(scene.body, part), **values)})(scene)
 
@@ -174,7 +174,7 @@ def reading_limit(scene: Scene) -> Limit:
 
 
 def displacement_at_surface(scene: Scene) -> Scene:
-    """Return the scene whose probes read the displacement at the surface."""
+    """Return the scene with probes that read the displacement at the surface."""
     return replace(scene, quantity=DISPLACEMENT.name, depth=0.0)
 
 
@@ -188,14 +188,14 @@ def load_limit(scene: Scene) -> Limit:
 
 
 def _without_load(scene: Scene) -> Scene:
-    """Return the scene without [load]; a load that no device makes leaves its Tacton."""
+    """Return the scene without [load]; the Tacton stays, even if no device made the load."""
     is_of_device = scene.load.of_kind.is_of_device
     pressure = scene.pressure if is_of_device else MovingPressure(tacton=scene.tacton)
     return replace(scene, load=PRESSURE, pressure=pressure)
 
 
 def plain_limits(scene: Scene) -> Iterator[Limit]:
-    """Yield the limits of a model of the displacement of the surface under a focus."""
+    """Yield the limits of models that compute only the surface displacement under a focus."""
     if not scene.reading.is_plain:
         yield reading_limit(scene)
     if not scene.load.is_plain:
@@ -203,7 +203,7 @@ def plain_limits(scene: Scene) -> Iterator[Limit]:
 
 
 def surface_limits(scene: Scene) -> Iterator[Limit]:
-    """Yield the same limits for a model that also computes the rates of that displacement."""
+    """Yield the same limits for models that also compute the rates of this displacement."""
     if not (scene.reading.record.is_normal and scene.reading.is_on_surface):
         yield reading_limit(scene)
     if not scene.load.is_plain:
@@ -211,7 +211,7 @@ def surface_limits(scene: Scene) -> Iterator[Limit]:
 
 
 def clamped_sheet_limits(body: Body) -> Iterator[Limit]:
-    """Yield the limits of a model of a flat sheet with clamped sides across the beam."""
+    """Yield the limits of models of a flat sheet across the beam with clamped sides."""
     if body.sides != "clamped":
         yield Limit(
             why=f"needs a sheet with clamped sides, not with {body.sides} sides",
@@ -226,7 +226,7 @@ def clamped_sheet_limits(body: Body) -> Iterator[Limit]:
 
 
 def flat_sheet_limits(body: Body) -> Iterator[Limit]:
-    """Yield the limit of a model of a sheet that is flat at rest."""
+    """Yield the limit of models of a sheet that is flat at rest."""
     if body.mounting.is_curled:
         yield Limit(
             why="needs a flat sheet, not a curled one",
@@ -254,13 +254,13 @@ def isotropic_limits(body: Body) -> Iterator[Limit]:
 
 
 def vacuum_limits(body: Body) -> Iterator[Limit]:
-    """Yield the limit of a model of sparse matrices, which exclude the added mass of air."""
+    """Yield the limit of models with sparse matrices, which exclude the added mass of air."""
     if body.air:
         yield _air_limit("does not include the air around a sheet")
 
 
 def frame_air_limits(body: Body) -> Iterator[Limit]:
-    """Yield the limit of elements, which include air only if it cannot flow around a free edge."""
+    """Yield the limit of elements, which include air only if there is no free edge."""
     if how := open_air(body):
         yield _air_limit(f"includes the air only around a sheet in a frame, not around one {how}")
 

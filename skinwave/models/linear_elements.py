@@ -85,7 +85,7 @@ def _as_slab(scene: Scene) -> Scene:
 
 
 def _coarser(body: Body) -> tuple[str, Callable[[Scene], Scene] | None]:
-    """Return the change to a thicker body or a shorter sheet, which needs fewer elements."""
+    """Return the change to a thicker body or a shorter sheet, with fewer elements."""
     if body.of_kind.is_plate:
         longest = MOST_SLENDER * min(body.width, body.height)
         sides = {"width": min(body.width, longest), "height": min(body.height, longest)}
@@ -161,9 +161,9 @@ def in_time(
     *,
     sag: Floats | float = 0.0,
 ) -> Floats:
-    """Return waveforms (t, p) of a scene's quantity at times (t,) in s, from components at rest
-    `stepped` (n, p c) in steps of dt from 0, and those under gravity, `sag` (p c,). Rates are those
-    of a cubic spline; stress relaxes in the p `solids` of the probes.
+    """Return waveforms (t, p) of a scene's quantity at times (t,) in s, from `stepped` (n, p c),
+    its components at rest in steps of dt from 0, and from `sag` (p c,), those under gravity. Rates
+    are those of a cubic spline; stress relaxes in the p `solids` of the probes.
     """
     quantity = scene.reading.record
     sampled = sampled_components(stepped, dt, times, quantity, solids)
@@ -192,7 +192,7 @@ def march(
     """Return the readings (steps + 1, p) of displacements (3 n,) in m in a time integration, and
     its last `energy_balance`, with the energy in J that is `stored` in a state.
 
-    Raises `fem.Diverged` if a state that is checked violates the balance.
+    Raises `fem.Diverged` if a checked state violates the balance.
     """
     readings = []
     for k, (state, energies) in enumerate(balanced):
@@ -205,7 +205,7 @@ def march(
 
 
 def step_count(duration: float, dt: float) -> int:
-    """Return the number of steps of dt that reach a duration in s, at most `MOST_STEPS`."""
+    """Return the number of steps of dt in a duration in s, or raise if beyond `MOST_STEPS`."""
     if dt > duration:
         raise ValueError(
             f"dt = {dt:g} s is longer than the response, {duration:g} s; use a shorter step"
@@ -282,7 +282,7 @@ def _line(
     frequency: float,
     pressure: fem.Complex,
 ) -> tuple[fem.Complex, fem.EnergyBalance]:
-    """Return the components (p c,) at rest of the probes at one line, and the power balance."""
+    """Return the probes' components (p c,) at rest of one line, and its power balance."""
     force, free = P @ pressure, ops.free
     u = solve(frequency, force)
     line = force[None, free], u[None, free], np.array([frequency])
@@ -296,7 +296,7 @@ def moved_line(
     solve: fem.LineSolver,
     motion: SupportMotion,
 ) -> tuple[fem.Complex, fem.EnergyBalance]:
-    """Return the components (p c,) on a support that moves, and the mean power balance."""
+    """Return the components (p c,) of a support's line, and the mean power balance."""
     force = sparse.csr_array(-meshed.inertia(build, motion.unit)[:, None])
     acceleration = np.array([motion.acceleration])
     relative, power = _line(ops, force, S, solve, motion.frequency, acceleration)

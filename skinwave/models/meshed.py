@@ -1,7 +1,7 @@
-"""Meshed body of a model: its operators, its load and probes, and its mirror symmetry.
+"""Meshed body of a model: operators, load, probes, and mirror symmetry.
 
-Across a plane of symmetry of a body every load is the sum of an even and an odd part, and so is the
-motion. Normal motion on the plane is that of the even part alone: of one half of the body, with
+With respect to a symmetry plane of a body, each load and each motion is the sum of an even and an
+odd part. Normal motion on the plane is that of the even part alone: of one half of the body, with
 symmetry conditions on the plane, under the mean of the load and its mirror image.
 """
 
@@ -53,7 +53,7 @@ def mesh_body(
     symmetry: str = "",
     discretise: Discretise | None = None,
 ) -> Build:
-    """Return the mesh of a body, as of `bodies.build.build`, timed and reported."""
+    """Mesh a body with `bodies.build.build`, timed and reported."""
     with clock("mesh"):
         report("mesh", 0.0)
         return build_body(body, h, symmetry, discretise)
@@ -69,8 +69,8 @@ def assemble(build: Build, clock: Clock, report: Progress) -> fem.Operators:
 def energy_balance(
     energies: fem.EnergyBalance, stored: float = 0.0, when: str = ""
 ) -> tuple[float, float]:
-    """Return the relative error of an energy or power balance with an energy `stored` at the end,
-    and the radiated share of the losses. Raises `fem.Diverged` if the error is too large.
+    """Return the relative error of an energy or power balance, with the energy in J `stored` at its
+    end, and the radiated share of the losses. Raises `fem.Diverged` if the error is too large.
     """
     imbalance = fem.imbalance(energies, stored)
     if not imbalance <= MOST_IMBALANCE:
@@ -83,7 +83,7 @@ def energy_balance(
 
 
 def with_cost(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
-    """Return the effort with time, memory, versions, and the mesh with its size in m."""
+    """Return the effort with time, memory, versions, mesh and element size in m."""
     return replace(
         effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
         mesh=cache.digest(build.mesh.points, build.mesh.tets),
@@ -134,7 +134,7 @@ def load_lines_at(
     pressures: Sequence[MovingPressure], points: Floats, threshold: float
 ) -> tuple[Floats, fem.Complex]:
     """Return distinct frequencies (f,) in Hz and amplitudes (f, c k) in Pa of the c components of a
-    load at points (k, 3); the threshold is as of `load_lines`.
+    load at points (k, 3); `threshold` is that of `load_lines`.
     """
     each = [pressure_lines(pressure, points, threshold) for pressure in pressures]
     if len(each) == 1:
@@ -166,7 +166,7 @@ def inertia(build: Build, direction: Sequence[float]) -> Floats:
 
 
 def with_sag(components: Floats, sag: Floats | float, quantity: Quantity) -> Floats:
-    """Return components (t, p c) with the static ones under gravity, except for rates."""
+    """Add the static components under gravity to components (t, p c), except for rates."""
     return components if quantity.rate else components + sag
 
 
@@ -186,7 +186,7 @@ def probe_rows(
     """Return the probe operator S (p c, 3 n) of the c components of a quantity at rest at probes
     (p, 2) in m, and the material at each probe, or () if the quantity does not depend on it.
 
-    Raises a ValueError if a probe is not in the body, or its strain in a coat.
+    Raises a ValueError if a probe is outside the body, or reads strain or stress in a coat.
     """
     quantity = reading.record
     check_coat(build, reading)
@@ -234,7 +234,7 @@ def line_factor(
 
 
 def mirrored_axes(body: Body, reading: Reading, load: Load) -> str:
-    """Return the axes across which a body is symmetric and its probes' quantity keeps its sign."""
+    """Return the axes across which a body is symmetric and its probes' quantity is even."""
     if not body.of_kind.is_symmetric or body.placement != FLAT:
         return ""
     # Other quantities change sign, and other loads may have a direction.
@@ -244,13 +244,13 @@ def mirrored_axes(body: Body, reading: Reading, load: Load) -> str:
 
 
 def axes_of_probes(probes: Floats, among: str) -> str:
-    """Return the axes, of some of "xy", on whose middle planes all probes (p, 2) in m lie."""
+    """Return the axes, `among` "xy", on whose middle planes all probes (p, 2) in m lie."""
     return "".join(axis for axis in among if np.abs(probes[:, "xy".index(axis)]).max() < ON_PLANE)
 
 
 def modelled_axes(body: Body, probes: Floats, symmetry: str, reading: Reading, load: Load) -> str:
-    """Return the axes, of "xy", across which only one half of a body is modelled: those of
-    `symmetry`, across which the load is symmetric at all times, and those of all probes.
+    """Return the axes, out of "xy", across which only one half of a body is modelled: those of
+    `symmetry`, across which the load is symmetric at all times, and those on which all probes lie.
     """
     on_plane = axes_of_probes(probes, mirrored_axes(body, reading, load))
     return "".join(axis for axis in "xy" if axis in symmetry or axis in on_plane)
@@ -265,9 +265,9 @@ def images(probes: Floats, axes: str) -> Floats:
 
 
 def even_part(P: sparse.csr_array, points: Floats, axes: str) -> tuple[sparse.csr_array, Floats]:
-    """Return the load operator (3 n, j k) of the even part of a load across some axes, on the half
-    of a body with positive coordinates: it takes the load at the points (k, 3) of an operator P
-    (3 n, k) and at their mirror images, together points (j k, 3) in m.
+    """Return the load operator (3 n, j k) of the even part of a load, on the half of a body with
+    positive coordinates. It acts on the load at the points (k, 3) of an operator P (3 n, k) and at
+    their mirror images across the axes; these points (j k, 3) in m are also returned.
     """
     for axis in axes:
         image = points.copy()

@@ -26,8 +26,8 @@ class SolveOptions:
     Parameters
     ----------
     model : str, a name of `models.names()`; "auto" selects the cheapest within the tolerance
-    tolerance : float, 0..1, acceptable relative error; reduction takes at most a fiftieth of it
-    h : float, m, element size; planned if not given, and with it the extent of the body
+    tolerance : float, 0 to 1, acceptable relative error; at most a fiftieth is due to reduction
+    h : float, m, element size; if not given, it and the extent of the body are planned
     dt : float, s, time step of "fem-transient" and the nonlinear models; chosen if not given
     solver : str, a backend of `fem.linear_solver`, or "auto"
     times : (t,) float, s, equally spaced within the duration, the first a multiple of their step;
@@ -82,7 +82,7 @@ def solver_name(solver: str) -> str:
 def response_of(
     scene: Scene, model: str, times: Floats, values: Floats, effort: Effort, error: float = nan
 ) -> Response:
-    """Return the response of a scene's quantity, with an error that the model measures."""
+    """Return the response for a scene's quantity, with an error measured by the model."""
     return Response(
         model=model, times=times, probes=scene.probe_points, quantity=scene.quantity,
         values=values, effort=effort, expected_error=error,
@@ -95,9 +95,9 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 
 
 def sample_grid(scene: Scene, times: ArrayLike | None = None) -> tuple[Floats, int]:
-    """Return times (t,) in s from 0, on which models compute, and the index of the first requested
-    one; by default those of the scene. Raises a ValueError if they are not evenly spaced, not
-    within the duration, or too many.
+    """Return the times (t,) in s from 0 at which models compute, and the index of the first
+    requested time; by default those of the scene. Raises a ValueError if times are not evenly
+    spaced, exceed the duration, or are too many.
     """
     if times is None:
         return sample_times(scene), 0

@@ -2,9 +2,9 @@
 
 `prepare` is that stage, for a scene and ranges of some of its keys. `lines` takes milliseconds: it
 solves Galerkin's equations of each line of the scene's load in a few states. `answer` returns the
-waveform from rest, by the poles of the reduced-order model. `at` returns that model, for any other
-Tacton. Poisson's ratios and the elements are fixed. With a thickness, the nodes of one mesh move,
-or the modulus and density of a sheet change.
+waveform from rest, from the poles of the reduced-order model. `at` returns this model, for any
+other Tacton. Poisson's ratios and the elements are fixed. With a thickness, the nodes of one mesh
+move, or the modulus and density of a sheet change.
 """
 
 from __future__ import annotations
@@ -76,8 +76,7 @@ INSIDE = 128  # materials inside the ranges, for the bases of lines
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParametricBody:
-    """Reduced body of a scene for every material and thickness of a range, as `skinwave.prepare`
-    returns it, with an example.
+    """Reduced body of a scene for all materials and thicknesses of a range; see `skinwave.prepare`.
 
     Attributes
     ----------
@@ -126,7 +125,7 @@ def prepare(
     ----------
     scene : Scene
     free : key of a scene file, such as "body.material.shear_modulus_pa", "body.thickness_mm" or
-        "body.layers.0.material.viscosity_pa_s" -> its least and largest value, in the file's unit
+        "body.layers.0.material.viscosity_pa_s" -> (lowest, highest) value, in the unit of the file
     tolerance : float, relative error of each line of the load at the probes
     progress : called with the name of the phase and the fraction done
     h : float, m, element size; the default of the body if not given
@@ -139,8 +138,8 @@ def prepare(
     Raises
     ------
     ValueError
-        If a key cannot be free, the quantity of the probes depends on it other than by the motion,
-        or the tolerance is out of reach.
+        If a key cannot be free, the probes' quantity depends on it not only through the motion, or
+        the tolerance cannot be reached.
 
     Examples
     --------
@@ -221,14 +220,14 @@ class _Stage:
         )  # fmt: skip
 
     def training(self) -> list[tuple[float, ...]]:
-        """Return shares (k,) of corners and middle at assembled geometries, and one between."""
+        """Return shares (k,): corners and middle at assembled geometries, and one in between."""
         count = len(self.bodies.meshed)
         few = [nearest_geometry(self.bodies, each) for each in training_shares(count, 0).tolist()]
         between = [(BETWEEN,) * count] if len(self.bodies.geometries) > 1 else []
         return list(dict.fromkeys([*few, *between]))
 
     def variant(self, at: tuple[float, ...], geometries: Mapping[Any, Any]) -> Variant:
-        """Return the body at shares of the range, at an assembled geometry or at its own."""
+        """Return the body at shares of the range, on an assembled geometry or its own."""
         body = self.bodies.body(at)
         shares = geometry_shares(self.bodies, body)
         nearest = list(geometries.values())[int(np.argmax(shares))]
@@ -242,7 +241,7 @@ class _Stage:
 
 
 def _reduce(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict[str, Any]:
-    """Reduce the body: fields of a `ParametricBody` that are cached."""
+    """Reduce the body; return the cached fields of a `ParametricBody`."""
     bodies, tolerance, scene = stage.bodies, stage.tolerance, stage.scene
     geometries: dict[Any, Callable[[], Geometry]] = {
         at: cached(partial(stage.geometry, at)) for at in bodies.geometries
@@ -277,7 +276,7 @@ def _reduce(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict
 
 
 def _strong_lines(model: AffineModel, frequencies: Floats, variants: Sequence[Variant]) -> Bools:
-    """Return the mask (f,) of lines that are strong for one of the variants, and of the mean."""
+    """Return the mask (f,) of lines that are strong in any variant, and of the mean."""
 
     def strength(each: Variant) -> Floats:
         at = weights(model.terms, each.solids, frequencies)
@@ -307,14 +306,14 @@ def _line_bases(
 
 
 def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats, fem.Complex]:
-    """Return the steady state of a body of the range at the strong lines of the scene's load:
+    """Return the steady state for values of the free keys, at the strong lines of the scene's load:
     frequencies (f,) in Hz, and amplitudes (f, p c) of the components at the probes.
     """
     return lines_of(prepared, with_values(prepared.scene.body, prepared.keys, values))
 
 
 def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]:
-    """Return the same for a body that differs from the scene's only by values of the free keys."""
+    """Return the same for a body that differs from the scene's only in its free keys."""
     solids = solids_of(prepared.reference, body)
     at_lines = weights(prepared.model.terms, solids, prepared.frequencies)
     motion = steady_lines(prepared.bases, at_lines, geometry_shares(prepared.bodies, body))
@@ -323,12 +322,12 @@ def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]
 
 
 def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
-    """Return the response of a body of the range from rest to the scene's Tacton."""
+    """Return the response from rest to the scene's Tacton, for values of the free keys."""
     return answer_of(at(prepared, values), prepared.scene)
 
 
 def at(prepared: ParametricBody, values: Mapping[str, float]) -> ReducedBody:
-    """Return the reduced body of values of the free keys, for any Tacton."""
+    """Return the reduced body for values of the free keys; it serves any Tacton."""
     body = relaxing(with_values(prepared.scene.body, prepared.keys, values), FIT_TOLERANCE)
     shares, scene = geometry_shares(prepared.bodies, body), prepared.scene
     model = prepared.model

@@ -2,9 +2,9 @@
 steady state, from rest, and at large deflection by von Karman's equations.
 
 At large deflection, the motion without stretching is that of `plate-modes-transient`, with all
-modes and without time steps. Time steps of the lowest modes add the effect of stretching. Their
-number and the number of modes follow from the tolerance and from two errors over the first part of
-each response: with steps half as long, and with fewer modes.
+modes and without time steps. Time steps of the lowest modes add the effect of stretching. The
+numbers of steps and modes follow from the tolerance and from two errors over the first part of each
+response: that of the steps, by halving them, and that of the modes, by using fewer.
 """
 
 import time
@@ -77,7 +77,7 @@ _karman = lru_cache(maxsize=6)(karman_plate)
 
 
 def middle_compliance(body: Body) -> float:
-    """Return the static deflection of the middle of a held sheet per force there, in m/N."""
+    """Return the static deflection at the middle of a supported sheet per force there, in m/N."""
     modes = modes_of(plate_of(replace(body, air=False)))
     at_rest = relative_modulus(body, 0.0).real
     stiffness = modes.squared * (1 + (at_rest - 1) * modes.elastic)
@@ -85,13 +85,13 @@ def middle_compliance(body: Body) -> float:
 
 
 def relative_modulus(body: Body, omega: ArrayLike) -> Any:
-    """Return the complex bending modulus at frequencies in rad/s, over that of the modes."""
+    """Return the complex bending modulus at frequencies in rad/s, relative to that of the modes."""
     return body.solid.complex_modulus(omega) / body.solid.shear_modulus
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Driven:
-    """Modes of a scene's plate under its load, and the shapes `outputs` (p, m) at its probes.
+    """Modes of a scene's plate under its load; `outputs` (p, m) are their shapes at the probes.
 
     The load has lines at `frequencies` (f,) in Hz with modal `forces` (f, m) in N kg^-1/2, and
     `motion` (f, m) in the steady state.
@@ -105,14 +105,14 @@ class Driven:
 
 
 def steady_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """Solve the steady state of the modes under every line of the load below half the rate."""
+    """Solve the steady state of the modes for all lines below half the sampling rate."""
     started, driven = time.perf_counter(), _drive(scene, times, options)
     return _response(scene, times, MODES.name, driven, _steady(scene, driven, times), started)
 
 
 def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Complex]:
     """Return frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity in the
-    steady state, at places (p, 2) in m or at its probes. Raises a ValueError for a load without
+    steady state, at places (p, 2) in m or at its probes. Raises a ValueError if the load has no
     lines.
     """
     driven = _drive(scene, sample_times(scene), SolveOptions())
@@ -123,7 +123,7 @@ def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Co
 
 
 def answer_from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """Solve the steady state and the free vibration that a start from rest leaves."""
+    """Solve the steady state and the free vibration after a start from rest."""
     started, driven = time.perf_counter(), _drive(scene, times, options)
     values = _steady(scene, driven, times) + _free_vibration(scene, driven, times)
     return _response(scene, times, FROM_REST.name, driven, values, started)
@@ -167,8 +167,8 @@ def _amplitudes(scene: Scene, driven: Driven) -> Complex:
 
 
 def _free_vibration(scene: Scene, driven: Driven, times: Floats) -> Floats:
-    """Return the free vibration (t, p) after the state of rest before t = 0: of uncoupled modes
-    each by itself, and of coupled ones such that all are at rest at t = 0.
+    """Return the free vibration (t, p) after the state of rest before t = 0. Uncoupled modes are
+    solved separately; coupled ones such that all are at rest at t = 0.
     """
     modes, f, forces = driven.modes, driven.frequencies, driven.forces
     free = free_modes(modes, scene.body.solid)
@@ -184,7 +184,7 @@ def _free_vibration(scene: Scene, driven: Driven, times: Floats) -> Floats:
 
 
 def limits(scene: Scene) -> Iterator[Limit]:
-    """Yield the limits of plate modes, which need a flat, held sheet, read at the surface."""
+    """Yield the limits of plate modes: a flat sheet with supports, read at the surface."""
     body = scene.body
     if not body.of_kind.is_plate:
         yield Limit(why=f"needs a sheet, not a {body.kind}")
@@ -245,13 +245,13 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
 
 
 def first_part(pressure: MovingPressure, times: Floats) -> Floats:
-    """Return the times (s,) in s over which errors are measured."""
+    """Return the times (s,) in s in which errors are measured."""
     slowest, _ = slowest_and_fastest(pressure)
     return times[: max(2, round(max(CHECKED_DURATION, 1 / slowest) / step(times)) + 1)]
 
 
 def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
-    """Return the largest relative error of the linear response (t, p) of a scene from rest."""
+    """Return the largest relative error of a linear response (t, p) from rest."""
     modes: PlateModes = modes_of(plate_of(scene.body))
     parts = ceil(step(times) / LONGEST - 1e-9)
     stretching = _stretching(scene, times, modes, min(COUNTS[0], len(modes.squared)), parts)
@@ -278,8 +278,8 @@ def steady_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Plate
 def _resolution(
     scene: Scene, times: Floats, options: SolveOptions, modes: PlateModes, linear: Floats
 ) -> tuple[int, int, float]:
-    """Return the number of modes that stretch the sheet, the number of time steps per sample, and
-    the error of both over the first part of a response, within the tolerance if possible.
+    """Return the numbers of stretching modes and of time steps per sample, and the resulting error
+    in the first part of a response, within the tolerance if possible.
     """
     sample = step(times)
     parts = ceil(sample / (options.dt or LONGEST) - 1e-9)
@@ -304,7 +304,7 @@ def _resolution(
 
 
 def _stretching(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int) -> Floats:
-    """Return the part (t, p) of the quantity that stretching adds, in `parts` steps per sample."""
+    """Return what stretching adds to the quantity (t, p), with `parts` steps per sample."""
     plate, coordinates = _stretching_coordinates(scene, times, modes, count, parts)
     values = coordinates @ plate.shapes(scene.probe_points - scene.body.placement.offset).T
     if rate := scene.reading.record.rate:

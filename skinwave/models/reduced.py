@@ -7,8 +7,8 @@
 
     u(t) = Re sum_f lines exp(2 pi i f t) + Re sum_m start exp(pole t)
 
-A body is reduced for its probes, to compute a few waveforms of any load, or for the load of one
-path, to compute the motion of the whole body.
+A body is reduced either for its probes, to compute their waveforms under any load, or for the load
+of one path, to compute the motion of the whole body.
 """
 
 from dataclasses import dataclass, replace
@@ -49,7 +49,7 @@ NEGLIGIBLE_LINE_RATIO = 1e-7  # to the strongest line at the probes
 
 
 def reduction_tolerance(tolerance: float) -> float:
-    """Return the tolerance of a reduction, a small share of that of a waveform."""
+    """Return the tolerance of a reduction, a small share of the waveform's."""
     return min(REDUCTION_TOLERANCE, tolerance / 50)
 
 
@@ -88,10 +88,10 @@ class ReducedBody:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedResponse:
-    """Response from rest, in reduced coordinates or in m at outputs.
+    """Response from rest in reduced coordinates, or at outputs in m.
 
-    The steady state has complex `lines` (f, q) at `frequencies` (f,) in Hz, and the free vibration
-    of the start complex amplitudes `start` (m, q) at `poles` (m,) in 1/s. `imbalance` is the
+    The steady state has complex `lines` (f, q) at `frequencies` (f,) in Hz. The free vibration
+    after the start has complex amplitudes `start` (m, q) at `poles` (m,) in 1/s. `imbalance` is the
     relative error of the energy balance, and `radiated` the share of absorbing boundaries in the
     losses.
     """
@@ -117,13 +117,13 @@ def prepare(
     load: Load = PRESSURE,
     discretise: Discretise | None = None,
 ) -> ReducedBody:
-    """Mesh, assemble, factorise and reduce a body, once for all Tactons and, by the cache, once per
-    machine.
+    """Mesh, assemble, factorise and reduce a body: once for all Tactons, and once per machine
+    thanks to the cache.
 
-    If all probes (p, 2) in m lie on a symmetry plane of the body, one half is modelled. `progress`,
-    `h` and `solver` are as in `SolveOptions`; `tolerance` is the relative error of the reduction;
-    `symmetry`, the axes across which all loads are symmetric, applies to normal motion under a
-    pressure, and `discretise` replaces the mesh of the body's kind.
+    If all probes (p, 2) in m lie on a symmetry plane of the body, only one half is modelled.
+    `progress`, `h` and `solver` are as in `SolveOptions`; `tolerance` is the relative error of the
+    reduction; `symmetry`, axes across which all loads are symmetric, applies to normal motion under
+    a pressure; `discretise` replaces the mesh of the body's kind.
     """
     clock, report = Clock(), progress or silent
     body = relaxing(body, SERIES_ERROR * tolerance)
@@ -146,7 +146,7 @@ def prepare(
 
 
 def cached_record(name: str) -> Any:
-    """Return the record that is cached under a name, or None."""
+    """Return the record cached under a name, or None."""
     entry = cache.load(name)
     try:
         return decode(entry["meta"], entry) if entry else None
@@ -209,7 +209,7 @@ def _prepare(
 
 
 def typical_spots(body: Body, points: Floats) -> Floats:
-    """Return unit Gaussian spots (n, 12) where palm-sized paths run, to estimate errors with."""
+    """Return unit Gaussian spots (n, 12) at random places near the origin, for error estimates."""
     reach = min(20e-3, body.width / 3, body.height / 3)
     centres = np.random.default_rng(0).uniform(-reach, reach, (12, 2))
     squared = ((points[:, None, :2] - centres) ** 2).sum(axis=2)
@@ -286,8 +286,8 @@ def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Fl
 def respond(
     reduced: ReducedBody, *pressures: MovingPressure, highest: float = np.inf
 ) -> ReducedResponse:
-    """Return the response of a reduced body, in its coordinates, to the components of a moving load
-    with lines below the `highest` in Hz. Raises `fem.Diverged` if it violates the energy balance.
+    """Return the response of a reduced body, in its coordinates, to the lines of a moving load
+    below `highest` in Hz. Raises `fem.Diverged` if it violates the energy balance.
     """
     frequencies, forces = reduced_forces(reduced, *pressures)
     frequencies, forces = frequencies[frequencies < highest], forces[frequencies < highest]
@@ -348,7 +348,7 @@ def answer(
 
 
 def steady_waveforms(reduced: ReducedBody, scene: Scene, times: Floats) -> Floats:
-    """Return waveforms (t, p) in the steady state, as of fem-harmonic, at times (t,) in s."""
+    """Return waveforms (t, p) in the steady state, as in fem-harmonic, at times (t,) in s."""
     motion, quantity = components(reduced, *scene.loads), reduced.reading.record
     # Under the mean an unconstrained body has no steady state.
     chosen = below_half_the_rate(motion.frequencies, times)
@@ -360,7 +360,7 @@ def steady_waveforms(reduced: ReducedBody, scene: Scene, times: Floats) -> Float
 def components(
     reduced: ReducedBody, *pressures: MovingPressure, highest: float = np.inf
 ) -> ReducedResponse:
-    """Return the response of the quantity's components at the probes, up to a `highest` line."""
+    """Return the response of the quantity's components at the probes, for lines below `highest`."""
     motion = read_at(respond(reduced, *pressures, highest=highest), reduced.read)
     if support := reduced.load.support_motion:
         frequencies = np.append(motion.frequencies, support.frequency)
@@ -390,7 +390,7 @@ def read_at(motion: ReducedResponse, outputs: Floats) -> ReducedResponse:
 
 
 def select_lines(motion: ReducedResponse, chosen: Bools) -> ReducedResponse:
-    """Return the response with the chosen lines (f,) only."""
+    """Return the response with only the chosen lines (f,)."""
     return replace(motion, frequencies=motion.frequencies[chosen], lines=motion.lines[chosen])
 
 

@@ -1,4 +1,4 @@
-"""Relative change of waveforms: the measure of every error that models and plans state."""
+"""Relative change of waveforms: the error measure of all models and plans."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ NO_MOTION = 1e-9  # of the probe that moves most: weaker motion is round-off
 
 
 def relative_changes(change: Array, values: Array) -> Floats:
-    """Return the norm of a change (k, p) over that of the values (k, p), for each of p probes."""
+    """Return the norm of a change (k, p) over that of values (k, p), for each of p probes."""
     sizes = np.linalg.norm(values, axis=0)
     floor = max(NO_MOTION * float(sizes.max()), 1e-300)
     return np.asarray(np.linalg.norm(change, axis=0) / np.maximum(sizes, floor))

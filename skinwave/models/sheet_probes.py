@@ -1,7 +1,7 @@
 """Quantities at the probes of a thin sheet, from the middle plane of its mesh.
 
-Strain is that of Green and Lagrange, and stress the second of Piola and Kirchhoff, along the axes
-of the sheet, which rotate with it. At the small strains of paper it equals Cauchy's stress there.
+Strain is Green-Lagrange strain, and stress is second Piola-Kirchhoff stress, along axes that rotate
+with the sheet. At the small strains of paper it equals Cauchy's stress along these axes.
 """
 
 from collections.abc import Callable
@@ -47,7 +47,7 @@ def sheet_rows(
 
 
 def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> Reader:
-    """Return the function of the displacement (3 n,) of a sheet to components (p c,)."""
+    """Return a function from the displacement (3 n,) of a sheet to components (p c,)."""
     if reading.record.is_normal:
         normal = fem.probe_operator(build.mesh, probes)
         return lambda u: normal @ u
@@ -74,7 +74,7 @@ def modal_reader(
     reading: Reading,
     solver: str,
 ) -> Reader:
-    """Return the function of the coordinates (r,) of bending modes to components (p c,)."""
+    """Return a function from coordinates (r,) of bending modes to components (p c,)."""
     quantity = reading.record
     if quantity.is_normal:
         normal = fem.probe_operator(build.mesh, probes) @ modes.basis

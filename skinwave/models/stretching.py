@@ -5,7 +5,7 @@ bending stiffness and mass of the true sheet. Its membrane stiffness is too smal
 d^2 / h^2, and a membrane in the middle plane adds the difference. Bending stiffness, mass and
 membrane stiffness are then those of the true sheet, and no element is flat.
 
-Time steps make an error that grows with frequency. In modes, the linear part of the motion is known
+The error of time steps grows with frequency. In modes, the linear part of the motion is known
 exactly and replaces that of the time steps, so that steps affect only the effect of stretching. The
 remaining error is measured with each response, in the quantity of the scene. The error of elements
 and of neglected modes is the difference of the linear part from that of a thin plate in its modes.
@@ -65,12 +65,12 @@ def stretching_size(body: Body, *, reduced: bool) -> float:
 
 
 def expected_error(body: Body, h: float) -> float:
-    """Return the error of a waveform with elements of h in m, as measured on a paper sheet."""
+    """Return the error of a waveform with elements of h in m, measured on a paper sheet."""
     return min(1.0, COARSE_ERROR * (h * FULL_CELLS / min(body.width, body.height)) ** ERROR_ORDER)
 
 
 def meshed_sheet(body: Body, h: float) -> Build:
-    """Return the mesh of the equivalent sheet in cells of h in m, with a thickness to match."""
+    """Return the mesh of the equivalent sheet, with cells of h in m and a suitable thickness."""
     thickness = min(STOCKY * h, STOUTEST * min(body.width, body.height))
     return build(body, h, discretise=partial(discretise, thickness=thickness))
 
@@ -123,7 +123,7 @@ def full_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Reduced:
-    """Sheet reduced to its bending modes, and the same without stretching, with its load."""
+    """Sheet reduced to its bending modes, with and without stretching, and its load."""
 
     made: Build
     modes: StretchingModes
@@ -180,7 +180,7 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
 def _modal_force(
     scene: Scene, linear: ReducedBody, times: Floats, dt: float
 ) -> Callable[[float], Floats]:
-    """Return the function of a time in s to the modal forces (r,)."""
+    """Return a function from a time in s to modal forces (r,)."""
     if len(load_lines(scene.pressure).frequencies) > MOST_LINES:
         load = load_in_steps((scene.pressure,), linear.points, times, dt)
         return lambda t: load(t) @ linear.forces
@@ -205,7 +205,7 @@ def _from_rest(
 
 @lru_cache(maxsize=1)
 def _reduce(body: Body, h: float, solver: str) -> _Reduced:
-    """Reduce the sheet to its modes, cached for many Tactons in a row."""
+    """Reduce the sheet to its modes; cached for successive Tactons."""
     made = meshed_sheet(body, h)
     operators = stretching_body(body, made).operators
     modes = stretching_modes(
@@ -233,8 +233,8 @@ def _march(
     body: fem.Elastic, force: Callable[[float], Floats], dt: float, times: Floats,
     options: SolveOptions, clock: Clock, *, read: Callable[[Floats], Floats], rows: Any,
 ) -> tuple[Floats, Floats, Effort]:  # fmt: skip
-    """Integrate in time from rest: components (n, p c) that are read at all steps, those of the
-    linear part in the same steps by `rows` (p c, r), and the effort.
+    """Integrate in time from rest. Return components (n, p c) at all steps, those of the linear
+    part at the same steps by `rows` (p c, r), and the effort.
     """
     solver, steps = options.solver, linear_elements.step_count(float(times[-1]), dt)
     cached, straight = lru_cache(maxsize=2)(force), []
@@ -256,7 +256,7 @@ def _march(
 
 
 def _normal_scene(scene: Scene) -> Scene:
-    """Return the scene with a normal motion whose error is no smaller than its quantity's."""
+    """Return the scene that reads normal motion with an error no smaller than its quantity's."""
     quantity = scene.reading.record
     rate = min(quantity.rate + (not quantity.is_normal), len(RATES) - 1)
     return replace(scene, quantity=RATES[rate].name, depth=0.0)
@@ -265,7 +265,7 @@ def _normal_scene(scene: Scene) -> Scene:
 def _plate_error(
     normal: Scene, times: Floats, options: SolveOptions, linear: Floats, h: float
 ) -> float:
-    """Return the error of a linear part (t, p) of the normal motion, by that of a thin plate."""
+    """Return the error of a linear part (t, p) of normal motion, compared with a thin plate."""
     if limits.beyond(FROM_REST, normal):
         return expected_error(normal.body, h)
     plate = FROM_REST.solve(normal, times, options).values

@@ -28,7 +28,7 @@ ENDLESS = 1.0  # s, duration of a pattern without an end
 
 
 def read(content: bytes, options: Options) -> Pattern:
-    """Read the pattern of an .adaptics file; if it jumps back for ever, only its loop."""
+    """Read the pattern of an .adaptics file; if it jumps back endlessly, only its loop."""
     animation = parse(content, options.parameters)
     notes = list(animation.notes)
     runs = np.array(animation.runs[animation.loop or 0 :])
@@ -101,8 +101,8 @@ def _loops(brushes: list[Brush], period: float, notes: list[str]) -> int:
 
 
 def _playhead(runs: Floats, count: int) -> tuple[Floats, Floats]:
-    """Return times (t,) in s at the engine's rate, with both ends, and the times (t,) in s of the
-    tracks if runs (k, 2) are played `count` times.
+    """Return times (t,) in s at the engine's rate, including both ends, and the corresponding times
+    (t,) in s in the tracks, for runs (k, 2) played `count` times.
     """
     ends = np.cumsum(np.diff(runs))
     t = np.linspace(0.0, count * ends[-1], round(count * ends[-1] * ENGINE_RATE) + 1)
@@ -175,8 +175,8 @@ def _brush_at(track: Track, p: Floats, t: Floats) -> tuple[Floats, Floats]:
     """Return offsets (t, 2) in mm of the focus, and cycles (t,) of the AM, at times p (t,) of the
     track and t (t,) of the clock in s.
 
-    Numbers of brushes of one kind are interpolated, of a lissajous only its rotation. A brush stays
-    constant until one of another kind.
+    Between brushes of one kind all numbers are interpolated, for a lissajous only the rotation.
+    Before a brush of another kind, a brush stays constant.
     """
     before, part = _keyframe_before(track, p)
     offset, cycles = np.zeros((len(t), 2)), np.zeros(len(t))

@@ -43,7 +43,7 @@ POINT = Brush(name="circle", numbers=(0.0,), am_frequency=0.0, drawing_frequency
 
 @dataclass(frozen=True, kw_only=True)
 class Track:
-    """Keyframes of one quantity: times in s, values, and whether each stays until the next."""
+    """Keyframes of one quantity: times in s, values, and whether each is held until the next."""
 
     times: tuple[float, ...]
     values: tuple[Any, ...]
@@ -55,8 +55,8 @@ class Animation:
     """Contents of a file for given values of its parameters.
 
     The tracks have places (x, y, z) in mm above the array, brushes, and intensities, which a
-    `factor` multiplies. `runs` are intervals (start, end) in s in the order of playback; `loop` is
-    the index of the run that follows the last one for ever, or None.
+    `factor` multiplies. `runs` are intervals (start, end) in s in the order of playback. After the
+    last run, those from index `loop` repeat endlessly, unless it is None.
     """
 
     name: str
@@ -94,7 +94,7 @@ class _Numbers:
         self.notes: dict[str, str] = {}
 
     def __call__(self, value: Any, name: str) -> float:
-        """Return the number that a value states: plain, of a parameter, or by a formula."""
+        """Return the number of a value: plain, from a parameter, or from a formula."""
         if not isinstance(value, dict) or "value" not in value:
             return _finite(value, name)
         kind = value.get("type")
@@ -107,7 +107,7 @@ class _Numbers:
         raise ValueError(f"{name} has the type {str(kind)[:40]!r}; use f64, param or formula")
 
     def is_met(self, condition: Table) -> bool:
-        """Whether the condition of a jump is met; a parameter without a value never meets it."""
+        """Whether the condition of a jump is met; never for a parameter without a value."""
         operator, parameter = condition.get("operator"), condition.get("parameter")
         word = operator.get("name") if isinstance(operator, dict) else operator
         compare = OPERATORS[choose("operator of a jump", str(word)[:40], OPERATORS)]
@@ -117,7 +117,7 @@ class _Numbers:
         return bool(compare(self._parameter(parameter), limit))
 
     def check_parameters(self) -> None:
-        """Raise a ValueError if a value is given for a parameter that the file does not have."""
+        """Raise a ValueError if a value was given for a parameter that the file does not have."""
         known = list({**self._definitions, **self.notes})
         if self._given and not known:
             raise ValueError("the file has no parameters; remove --parameter")
@@ -214,7 +214,7 @@ def _keyframes(table: Table, speed: float) -> list[tuple[float, Table]]:
 
 
 def _track(entries: list[Entry], first: Any) -> Track:
-    """Return a track; like in the engine, it has the value `first` until its first keyframe."""
+    """Return a track; as in the engine, it has the value `first` until its first keyframe."""
     if not entries or entries[0][0] > 0:
         entries = [(0.0, first, True), *entries]
     times, values, steps = zip(*entries, strict=True)
@@ -235,8 +235,8 @@ def _runs(
 ) -> tuple[tuple[tuple[float, float], ...], int | None]:
     """Return runs and loop of an `Animation`, given the kind of keyframe at each time and jumps.
 
-    Playback jumps or stops when it passes the time of a keyframe, not where it begins; a jump comes
-    before a stop. The pattern ends after a jump into a part that is stopped.
+    Playback jumps or stops when it passes the time of a keyframe, not if it begins there. A jump
+    precedes a stop at the same time. The pattern ends after a jump into a stopped part.
     """
     runs: list[tuple[float, float]] = []
     entered: dict[float, int] = {}
@@ -254,7 +254,7 @@ def _runs(
 
 
 def _setting(frame: Table, key: str, number: _Numbers) -> tuple[Any, bool]:
-    """Return the value that a keyframe sets, and whether it stays until the next one."""
+    """Return the value that a keyframe sets, and whether it is held until the next one."""
     outer = _child(frame, key, dict)
     transition = _child(outer, "transition", dict, {"name": "linear"}).get("name")
     step = choose(f"transition of {key}", str(transition)[:40], ("linear", "step")) == "step"

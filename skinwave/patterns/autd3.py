@@ -1,7 +1,7 @@
 """Writer of a Python script that plays a Tacton on AUTD3 devices with FociSTM of pyautd3.
 
 The device steps through a list of foci at 40 kHz / N and repeats it, so that its drawing frequency
-is 40 kHz / (N points). The script has the nearest such frequency.
+is 40 kHz / (N points). The script uses the nearest such frequency.
 """
 
 from math import ceil
@@ -24,7 +24,7 @@ RESOLUTION = 0.025  # mm, of positions in devices
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     """Return the script, and notes on its approximations; raise a ValueError if the path is too
-    slow, or no sound makes the load.
+    slow, or if no sound produces the load.
     """
     pressure, path = scene.pressure, scene.tacton.trajectory
     foci, in_turn = len(scene.tacton.foci), scene.tacton.sharing == "time_multiplexed"
@@ -46,8 +46,8 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 
 def steps(frequency: float, multiple: int = 1) -> tuple[int, int]:
-    """Return points per period, a multiple of `multiple`, and ticks per point that are nearest to a
-    drawing frequency in Hz; two points, the least of a FociSTM, for a focus at rest.
+    """Return points per period, a multiple of `multiple`, and ticks per point for the frequency
+    nearest to a drawing frequency in Hz; for a focus at rest two points, the minimum of a FociSTM.
 
     Raises a ValueError if the frequency is too low for a device.
     """

@@ -1,4 +1,4 @@
-"""Conversion between pattern files, by the suffixes of their names."""
+"""Conversion between pattern files; their suffixes define the formats."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ LARGEST = {".adaptics": 16_000_000, ".csv": 128_000_000, ".wav": 32_000_000}  # 
 def convert(
     source: Path, target: Path, options: Options, base: Scene | None = None
 ) -> tuple[bytes, tuple[str, ...]]:
-    """Convert a pattern file to the format of another.
+    """Convert a pattern file to another format.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ default units are s and m.
 
 Intensity, 0 to 1, is the sound pressure of a point relative to full drive; the radiation pressure
 is its square. Several points become one path: the paths of all points in sequence, on which each
-focus is one part ahead of the one before.
+focus runs one part ahead of the previous one.
 """
 
 import re
@@ -79,7 +79,7 @@ def read(content: bytes, options: Options) -> Pattern:
 def tacton_of(times: Floats, places: Floats, levels: Floats, *, hold: bool = False) -> Tacton:
     """Return a Tacton of foci at places (n, t, 2) in m with levels (n, t) at times (t,) in s.
 
-    The last sample lasts as long as the one before it.
+    The last sample lasts as long as the previous one.
     """
     n, count = levels.shape
     if np.ptp(places, axis=(0, 1)).max() == 0 and np.ptp(levels) == 0 and n == 1:
@@ -146,7 +146,7 @@ def _rows(content: bytes) -> list[tuple[int, list[str]]]:
 
 
 def _columns(words: list[str]) -> list[tuple[str, float]]:
-    """Return name and unit, in s or m, of each column of a header."""
+    """Return name and unit (in s or m) of each column of a header."""
     columns = [_column(word) for word in words]
     names = [name for name, _ in columns]
     if len(set(names)) < len(names):

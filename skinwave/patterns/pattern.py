@@ -1,4 +1,4 @@
-"""Contents of a pattern file, and the choices of a user about it."""
+"""Contents of a pattern file, and options for reading and writing."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -32,17 +32,17 @@ class Pattern:
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Choices about a pattern file.
+    """Options for a pattern file.
 
     Parameters
     ----------
-    rate : Hz, of the samples of a CSV that is read without times or written
-    height : m, of the focus, in place of that in the file
-    hold : whether a focal point stays until the next sample, or else moves straight
+    rate : Hz, sampling rate of a CSV that is read without times, or written
+    height : m, of the focus, replaces that of the file
+    hold : whether a focal point stays until the next sample; otherwise it moves straight
     role : "modulation" or "envelope", the meaning of a WAV
-    scale : "full", "peak" or "rms", of the samples of a WAV: as stored, or scaled to a peak of 1,
-        or to the root mean square of a full sine
-    parameters : values of parameters of an AdapTics file, in place of their defaults
+    scale : "full", "peak" or "rms": samples of a WAV as stored, scaled to a peak of 1, or scaled to
+        the root mean square of a full sine
+    parameters : values of parameters of an AdapTics file, replace their defaults
     resize : factor of all positions of the path, about the origin
     """
 
@@ -56,7 +56,7 @@ class Options:
 
 
 def onto(base: Scene, pattern: Pattern, name: str) -> Scene:
-    """Return the base scene with the pattern in place of its Tacton."""
+    """Return the base scene with the pattern as its Tacton."""
     pressure = replace(base.pressure, tacton=pattern.tacton, **pattern.pressure)
     clean = (pattern.name or name).encode("utf-8", "replace").decode()  # without lone surrogates
     return replace(base, name=clean, pressure=pressure)
@@ -76,7 +76,7 @@ def resize(tacton: Tacton, factor: float) -> Tacton:
 
 
 def wide_enough(base: Scene, tacton: Tacton, notes: list[str]) -> Scene:
-    """Widen the body of the base scene to contain the path of a Tacton, with a note if it does."""
+    """Widen the body of the base scene if the path of a Tacton needs it, and add a note."""
     reach = 2 * (np.abs(tacton.trajectory.outline).max(axis=0) + MARGIN)
     width, height = np.maximum(reach, [base.body.width, base.body.height]).tolist()
     if (width, height) == (base.body.width, base.body.height):
@@ -89,7 +89,7 @@ def wide_enough(base: Scene, tacton: Tacton, notes: list[str]) -> Scene:
 
 
 def aliasing_notes(tacton: Tacton, rate: float) -> list[str]:
-    """Return a note on each tone of the modulation above half a rate in Hz."""
+    """Return a note on each tone of the modulation above half a sampling rate in Hz."""
     return [
         f"AM of {f:g} Hz is above half the sample rate, {rate / 2:g} Hz, and becomes "
         f"{abs(f - rate * round(f / rate)):g} Hz; lower the AM, or raise the rate"
@@ -99,8 +99,8 @@ def aliasing_notes(tacton: Tacton, rate: float) -> list[str]:
 
 
 def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float]:
-    """Return the pressure key of the height: that of the options, or the common one of foci at z
-    (k,) in m; raise a ValueError if they differ.
+    """Return the key of the height: that of the options, or the common height z (k,) in m of all
+    foci; raise a ValueError if they differ.
     """
     if options.height is not None:
         return {"height": options.height}

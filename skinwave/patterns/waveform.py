@@ -21,8 +21,8 @@ RESOLUTION = 2.0**-15  # of full scale, that of 16 bits: an envelope may be belo
 
 
 def read(content: bytes, options: Options, base: Scene) -> Pattern:
-    """Read a WAV as the envelope of the base scene's Tacton in place of its rhythm, or as its
-    modulation in place of its sinusoids; the Tacton lasts as long as the WAV.
+    """Read a WAV as the envelope of the base scene's Tacton, replacing its rhythm, or as its
+    modulation, replacing its sinusoids. The Tacton lasts as long as the WAV.
     """
     choose("role of a WAV", options.role, ROLES)
     choose("scale", options.scale, SCALES)

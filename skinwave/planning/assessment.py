@@ -40,9 +40,9 @@ def assess(
     """Return a response of linear elements with its expected error and all warnings.
 
     `moved` is the reduced body of the response, or the quantity of interest of another model:
-    waveforms (t, p), or the lines (f, p) of an unconstrained body. `compared` is an element size in
-    m to compare with and the body with it; chosen here if not given. `meshed` is the body whose
-    mesh both sizes are of, if nodes were moved to the scene's body.
+    waveforms (t, p), or the lines (f, p) of an unconstrained body. `compared` is another element
+    size in m and the body meshed with it; chosen here if not given. `meshed` is the body to which
+    both sizes belong, if nodes were moved to the scene's body.
     """
     if isinstance(moved, ReducedBody):
         moved = refinement.quantity_of_interest(moved, scene, response)
@@ -83,8 +83,8 @@ def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
 def all_warnings(
     scene: Scene, response: Response, tolerance: float = 0.05, h: float | None = None
 ) -> tuple[str, ...]:
-    """Return all warnings of a response without solving another mesh: of linear elements of h in m
-    those that do not depend on their error, of other models those of their plan.
+    """Return all warnings of a response without solving another mesh. For linear elements of h in m
+    these are warnings that do not depend on their error, for other models those of the plan.
     """
     if named(response.model).default_size and h:
         warnings, predicted = errors.element_warnings(scene, h, 0.0), 0.0
@@ -96,7 +96,7 @@ def all_warnings(
 
 
 def _coarser_size(body: Body, h: float) -> float:
-    """Return a size in m to compare a default one with at little cost, if it has a mesh."""
+    """Return a size in m for a cheap comparison with a default size, if there is such a mesh."""
     try:
         check_mesh(body, COARSE_RATIO * h)
     except ValueError:

@@ -1,12 +1,12 @@
-"""Error budget of a response: its numerical error, and the uncertainty from the spread of materials
-and of the device, all relative to the waveform of the worst probe.
+"""Error budget of a response: numerical error, and uncertainty due to the spread of materials and
+of the device, all relative to the waveform of the worst probe.
 
-The propagation is of first order: each number moves by one standard deviation either way, half of
-the difference of the waveforms counts, and independent numbers add as squares. Waveforms are in the
-steady state, about the mean. Layers are solved by wavenumber integrals, with a palm as flat layers
-as deep as its middle and a tilted body as a flat one; a held sheet by the modes of a linear plate.
-A body from a file, whose resonances depend on its sides, and a curled sheet have no such solution:
-only the uncertainty from the pressure is known.
+Propagation of uncertainty is of first order: each number varies by one standard deviation either
+way, half the difference of the waveforms is its contribution, and contributions of independent
+numbers add as squares. Waveforms are in the steady state, about the mean. Layers are solved by
+wavenumber integrals: a palm as flat layers as deep as its middle, a tilted body as a flat one. A
+supported sheet is solved by the modes of a linear plate. For a body from a file, whose resonances
+depend on its sides, and a curled sheet, only the uncertainty due to the pressure is known.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,8 +39,9 @@ ENOUGH = 0.1  # of the uncertainty: a smaller numerical error gains nothing
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorBudget:
-    """Relative errors of the worst probe's waveform: `numerical`, and by one standard deviation of
-    the numbers of the `material` and of the `device`; nan if not computed, 0 if no spread is known.
+    """Relative errors of the worst probe's waveform: `numerical`, and those due to one standard
+    deviation of numbers of the `material` and of the `device`; nan if not computed, 0 if no spread
+    is known.
     """
 
     numerical: float
@@ -101,7 +102,7 @@ def _uncertainty(scene: Scene, spreads: Sequence[Spread]) -> float:
 
 
 def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | None:
-    """Return half the relative change (p,) of the motion between both ends of a number, or None."""
+    """Return half the relative change (p,) of the motion between two values, or None."""
     lines_of = _closed_form(scene)
     if lines_of is None or (lines_of is _lines_of_layers and key.startswith(NOT_IN_LAYERS)):
         return None
@@ -136,7 +137,7 @@ def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
 
 
 def _lines_of_plate(scene: Scene) -> tuple[Floats, Complex]:
-    """Return the same for a held sheet, in the quantity of its probes."""
+    """Return the same for a supported sheet, in the quantity of its probes."""
     f, a = steady_lines_of_plate(scene)
     return f[f > 0], a[f > 0]
 

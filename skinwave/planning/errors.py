@@ -1,4 +1,4 @@
-"""Expected error of a response: its parts, their total, and the warnings that they cause."""
+"""Expected error of a response: its parts, their total, and the resulting warnings."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -29,13 +29,13 @@ class ErrorPart:
 
 
 def total_error(parts: Iterable[ErrorPart], *, independent: bool = False) -> float:
-    """Return the sum of the parts, or of independent ones the root of the sum of squares."""
+    """Return the sum of the parts, or the root of the sum of squares if they are independent."""
     errors = [part.error for part in parts]
     return float(np.linalg.norm(errors) if independent else sum(errors))
 
 
 def part_warnings(parts: Iterable[ErrorPart], tolerance: float) -> tuple[str, ...]:
-    """Return a warning of each part that is above the tolerance."""
+    """Return a warning for each part above the tolerance."""
     return tuple(
         f"{part.source}: expected error {change_text(part.error)}, tolerance "
         f"{100 * tolerance:g} %; {part.cure}"
@@ -69,7 +69,7 @@ def element_warnings(scene: Scene, h: float, mesh: float) -> tuple[str, ...]:
 
 
 def band_part(scene: Scene, band: float, error: float) -> ErrorPart:
-    """Return the part of motion above the band of a response in Hz."""
+    """Return the part due to motion above the band of a response in Hz."""
     cure = "use a load that begins smoothly"
     if scene.reading.record.rate:
         cure = f"read the displacement, or {cure}"
@@ -77,7 +77,7 @@ def band_part(scene: Scene, band: float, error: float) -> ErrorPart:
 
 
 def start_part(model: Model, error: float) -> ErrorPart:
-    """Return the part of the start from rest, which a model of the steady state leaves out."""
+    """Return the part due to the start from rest, which a model of the steady state leaves out."""
     return ErrorPart(
         source=f"the initial transient, which {model.name} leaves out", error=error,
         cure=f"use --model {model.from_rest}",
@@ -87,8 +87,8 @@ def start_part(model: Model, error: float) -> ErrorPart:
 def series_part(
     scene: Scene, model: str, tolerance: float, prepared: ReducedBody | None = None
 ) -> ErrorPart | None:
-    """Return the part of the Prony series that a model takes for the modulus laws of a body; None
-    if it takes none. A `prepared` body on any mesh saves the reduction of a coarse one.
+    """Return the part due to Prony series that replace the modulus laws of a body; None if the
+    model uses none. A `prepared` body on any mesh saves the reduction of a coarse one.
     """
     laws = own_laws(scene.body)
     if not laws or not named(model).takes_series(scene.body):

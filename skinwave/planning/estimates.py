@@ -30,7 +30,8 @@ DURATION, RATE = 0.1, 2500.0  # s and Hz of the estimate of reflections
 
 def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
     """Return frequencies (f,) in Hz of the lines that move the probes, and the share (f, p) of each
-    in the power of the motion: by the wavenumber integral of the infinite body, or of the load.
+    in the power of the motion, from the wavenumber integral of the infinite body, or in that of the
+    load.
     """
     body = scene.body
     if scene.tacton.trajectory.shape == "recorded":
@@ -59,7 +60,7 @@ def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
 
 
 def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> float:
-    """Return the frequency in Hz above which lines move no probe by a third of the tolerance."""
+    """Return the frequency in Hz above which lines change no probe by a third of the tolerance."""
     above = np.cumsum(shares[::-1], axis=0)[::-1].max(axis=1)
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
 
@@ -79,13 +80,13 @@ def _width(pressure: MovingPressure) -> float | None:
 
 
 def side_reflections(scene: Scene) -> float:
-    """Return the reflections from the sides at the probes over their motion in an infinite body, at
-    most `NO_BOUND`, which also stands for unknown reflections.
+    """Return the ratio of reflections from the sides to the motion of the probes in an infinite
+    body, at most `NO_BOUND`, which also stands for unknown reflections.
 
     The reflection of a side at a probe is the motion of an infinite body at the mirror image of the
     probe. The estimate is the root of the four energies times `IN_PHASE`, because reflections may
-    add up, and times up to `OVERDAMPED` where shear waves cannot oscillate. Absorbing sides do not
-    reflect, and a half-space has no sides.
+    be in phase, and times up to `OVERDAMPED` where shear waves cannot oscillate. Absorbing sides do
+    not reflect, and a half-space has no sides.
     """
     body, probes = scene.body, scene.probe_points
     half = np.array([body.width, body.height]) / 2
@@ -122,11 +123,11 @@ def _loss_at_cut_off(body: Body) -> float:
 
 
 def absorbing_reflection(scene: Scene, half: Floats, highest: float) -> float:
-    """Return the reflection of absorbing sides at distances `half` (2,) in m from the middle, over
-    the steady motion of the probes; 1, for unknown, for a body with too little loss.
+    """Return the ratio of the reflection of absorbing sides, at distances `half` (2,) in m from the
+    middle, to the steady motion of the probes; 1, unknown, for a body with too little loss.
 
-    The wavenumber integral of the infinite body gives the motion by mirror images of the focus in
-    the four sides, for lines of the load up to the `highest` in Hz.
+    The wavenumber integral of the infinite body gives the motion due to mirror images of the focus
+    in the four sides, for lines of the load up to `highest` in Hz.
     """
     body = scene.body
     width = spot_scale(scene.pressure)
@@ -159,7 +160,7 @@ def _mirror_images(points: Floats, half: Floats) -> list[Floats]:
 
 
 def _reflecting(body: Body, images: list[Floats]) -> list[Floats]:
-    """Return the mirror images in the sides of a body that do not absorb."""
+    """Return the mirror images in those sides of a body that do not absorb."""
     each = zip(EDGES, images, strict=True)  # both are left, right, front and back
     return [image for name, image in each if body.side(name) != "absorbing"]
 
@@ -171,7 +172,7 @@ def _to_edge(scene: Scene, half: Floats) -> float:
 
 
 def path_places(path: Trajectory) -> Floats:
-    """Return some positions (k, 2) in m of the focus."""
+    """Return positions (k, 2) in m of the focus on its path."""
     if path.shape in BY_POINTS:
         return path.outline[:: max(1, len(path.points) // 24)]
     return path.at_phase(np.arange(24) / 24)

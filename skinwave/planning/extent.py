@@ -1,8 +1,8 @@
 """Extent of the modelled body: its symmetry, and the distance of its absorbing ends.
 
 To estimate the error of an absorbing layer, a coarse mesh is solved again with a layer twice as
-wide. A wider layer damps waves more, and near fields end further out, so that the change of the
-waveforms is most of what the usual layer reflects.
+wide. A wider layer damps waves more, and near fields end further out. The change of the waveforms
+is therefore most of the reflection of the usual layer.
 """
 
 from dataclasses import replace
@@ -76,10 +76,11 @@ def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -
 def extent(
     scene: Scene, options: SolveOptions, highest: float
 ) -> tuple[Body, list[PlanRow], float]:
-    """Return the body to model, a row if it is not the scene's, and its error by absorbing ends.
+    """Return the body to model, a row if it is not the scene's, and the error of its absorbing
+    ends.
 
-    The body is cut where reflections of lines up to the `highest` in Hz do not matter, or extended
-    at its absorbing ends until these leave a small share of the tolerance.
+    The body is cut where reflections of lines up to `highest` in Hz are negligible, or extended at
+    its absorbing ends until their error is a small share of the tolerance.
     """
     body, rows = _within_reflections(scene, options.tolerance, highest)
     larger, error = body, absorbing_error(scene, body, options)
@@ -101,9 +102,9 @@ def extent(
 def _within_reflections(
     scene: Scene, tolerance: float, highest: float
 ) -> tuple[Body, list[PlanRow]]:
-    """Return the body out to where reflections of lines up to the `highest` in Hz are negligible,
-    and a row if that is not the whole body. Only absorbing sides are moved inwards, because
-    reflections from others belong to the response.
+    """Return the part of the body beyond which reflections of lines up to `highest` in Hz are
+    negligible, and a row if it is not the whole body. Only absorbing sides are moved inwards,
+    because reflections from others belong to the response.
     """
     body = scene.body
     if not is_flat_layer(body) or (body.base, body.sides) != ("clamped", "absorbing"):
@@ -130,7 +131,7 @@ def _within_reflections(
 
 
 def _larger(body: Body) -> Body:
-    """Return the body with its absorbing ends further out by the width of their layer."""
+    """Return the body with its absorbing ends moved out by the width of their layer."""
     ends = [{body.side(name) for name, (k, _) in EDGES.items() if k == axis} for axis in (0, 1)]
     absorbs = np.array([*(each == {"absorbing"} for each in ends), body.base == "absorbing"])
     width, height, depth = layer_of(body).width * absorbs * (2, 2, 1)

@@ -1,11 +1,11 @@
-"""What a model leaves out of a response: the start from rest, motion above its band, stretching of
-a sheet, the law of a material behind a Prony series, and errors of natural frequencies.
+"""Errors by what a model leaves out: the start from rest, motion above its band, stretching of a
+sheet, a modulus law that a Prony series replaces, and errors of natural frequencies.
 
 Each function returns a relative error of the worst probe's waveform.
 
-A sheet of thickness h that deflects by w stiffens in proportion to (w / h)^2. Near a resonance, the
-small errors of natural frequencies by discretisation change the waveform many times as much. The
-sensitivity follows from the poles of a coarse reduced model, shifted by a thousandth.
+A sheet of thickness h that deflects by w stiffens in proportion to (w / h)^2. Near a resonance,
+small discretisation errors of natural frequencies cause much larger errors of the waveform. The
+sensitivity is computed by shifting the poles of a coarse reduced model by a thousandth.
 """
 
 from collections.abc import Callable
@@ -64,7 +64,7 @@ def start_error(
 ) -> float:
     """Return the difference of a steady state from the motion from rest; 0 for a model from rest.
 
-    `grid` is as of `sample_grid`; a model of elements needs its `prepared` body. Raises a
+    `grid` is that of `sample_grid`; a model of elements needs its `prepared` body. Raises a
     ValueError or ArithmeticError if the scene has no steady state.
     """
     if not model.is_steady:
@@ -81,8 +81,8 @@ def start_error(
 
 
 def _start(steady: Floats, from_rest: Callable[[int], Floats], first: int) -> float:
-    """Return that difference from sample `first` on, of a steady state (t, p) and a function that
-    gives the first n samples from rest. More samples are compared until what may follow them is
+    """Return that difference from sample `first` on, between a steady state (t, p) and a function
+    that returns the first n samples from rest. The number of samples grows until the rest is
     negligible, assuming that the difference continues at its last level.
     """
     samples = len(steady)
@@ -101,12 +101,12 @@ def _start(steady: Floats, from_rest: Callable[[int], Floats], first: int) -> fl
 
 
 def above_band_error(scene: Scene, model: Model, grid: tuple[Floats, int]) -> float:
-    """Return the part of a wavenumber integral from rest above its band; 0 for a quantity that does
-    not jump, and for a steady state.
+    """Return the share of a wavenumber integral from rest above its band; 0 for a quantity without
+    jumps, and for a steady state.
 
-    Velocity and acceleration jump where a load begins abruptly. With twice the band, the error of a
-    velocity halves, so that it is twice the change. The first sample of an acceleration may have no
-    limit; its error, measured with sixteen times the band, is three times the change.
+    Velocity and acceleration jump where a load begins abruptly. Doubling the band halves the error
+    of a velocity, so that the error is twice the change. The first sample of an acceleration may
+    have no limit; its error, measured with sixteen times the band, is three times the change.
     """
     if model.is_steady or not scene.reading.record.rate:
         return 0.0
@@ -119,9 +119,9 @@ def above_band_error(scene: Scene, model: Model, grid: tuple[Floats, int]) -> fl
 
 
 def linear_deflection(scene: Scene) -> float:
-    """Return the largest linear deflection of a held sheet over its thickness: at its probes and in
-    its middle from rest, or in its middle under its mean load. It is 0 for other bodies, and for
-    curled sheets, whose rise stiffens them.
+    """Return the largest linear deflection of a supported sheet relative to its thickness: at its
+    probes and middle from rest, or at its middle under the mean load. It is 0 for other bodies, and
+    for curled sheets, which are stiffened by their rise.
     """
     body = scene.body
     flat = body.of_kind.is_plate and not body.mounting.is_curled
@@ -160,10 +160,10 @@ def _first_times(scene: Scene) -> Floats:
 
 
 def stretching_error(scene: Scene, model: Model, tolerance: float) -> float:
-    """Return the error of a linear model of a sheet that stretches; 0 for other models and bodies.
+    """Return the error of a linear model for a sheet that stretches; 0 for other models and bodies.
 
     If the deflection is small, its square bounds the error. Otherwise `plate-modes-nonlinear`
-    measures the error in the displacement, if it takes the scene.
+    measures it in the displacement, if this model takes the scene.
     """
     if model.is_nonlinear or not model.needs_body:
         return 0.0
@@ -175,7 +175,7 @@ def stretching_error(scene: Scene, model: Model, tolerance: float) -> float:
 
 
 def beyond_linear(scene: Scene, tolerance: float) -> bool:
-    """Whether a sheet stretches or deflects too much for linear models."""
+    """Whether a sheet stretches or deflects too much for a linear model."""
     if not takes(STRETCHED, scene):
         return False
     error = stretching_error(scene, FROM_REST, tolerance)
@@ -183,8 +183,8 @@ def beyond_linear(scene: Scene, tolerance: float) -> bool:
 
 
 def deflection_ratio(scene: Scene, response: Response) -> float:
-    """Return the largest deflection of a sheet over its thickness, at its probes in a response or
-    as of `linear_deflection`. The rigid-body motion of an unconstrained sheet does not count.
+    """Return the largest deflection of a sheet relative to its thickness, at its probes in a
+    response or from `linear_deflection`, without the rigid-body motion of an unconstrained sheet.
     """
     body = scene.body
     if not body.of_kind.is_plate:
@@ -195,9 +195,9 @@ def deflection_ratio(scene: Scene, response: Response) -> float:
 
 
 def mean_sag(scene: Scene) -> float:
-    """Return the linear deflection in m of the middle of a held sheet under its mean load, applied
-    there: 0.0056 F a^2 / D for a clamped square (Timoshenko and Woinowsky-Krieger 1959, table 37);
-    by the modes of the plate for other supports, and orthotropic or stretched sheets.
+    """Return the linear deflection in m of the middle of a supported sheet under its mean load,
+    applied there: 0.0056 F a^2 / D for a clamped square (Timoshenko and Woinowsky-Krieger 1959,
+    table 37), otherwise from the modes of the plate.
     """
     body = scene.body
     if body.mounting == FRAME and body.solid.orthotropy is None:
@@ -220,8 +220,8 @@ def _mean_force(scene: Scene) -> float:
 
 def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> tuple[float, float]:
     """Return the relative change of the worst probe's waveform per relative change of all natural
-    frequencies, and the root-mean-square frequency of the motion in Hz; from two responses of a
-    reduced body, or of a coarse mesh.
+    frequencies, and the root-mean-square frequency of the motion in Hz, from two responses of a
+    reduced body, by default on a coarse mesh.
     """
     h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
     coarse = prepared or prepare(scene.body, scene.probe_points, h=h, load=scene.load.moving)
@@ -248,8 +248,8 @@ def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> tuple[floa
 def series_error(
     scene: Scene, model: str, tolerance: float, prepared: ReducedBody | None = None
 ) -> float:
-    """Return the error of Prony series in place of modulus laws; 0 for a model that takes the laws
-    themselves. A `prepared` body on any mesh saves the reduction of a coarse one.
+    """Return the error of Prony series in place of modulus laws; 0 for a model that uses the laws.
+    A `prepared` body on any mesh saves the reduction of a coarse one.
     """
     solids, known, allowed = own_laws(scene.body), named(model), series_tolerance(tolerance)
     if not solids or not known.takes_series(scene.body):
@@ -270,7 +270,7 @@ def _series_deviation(solid: Material, pressure: MovingPressure, allowed: float)
 
 
 def _steady_change(scene: Scene, allowed: float, otherwise: float) -> float:
-    """Return the relative change of the steady motion of an infinite body by the series."""
+    """Return the relative change of an infinite body's steady motion due to the series."""
     if scene.tacton.trajectory.shape == "recorded":
         return otherwise
     own, series = (

@@ -33,14 +33,14 @@ from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
 INTEGRAL_ERROR = 0.002  # of a wavenumber integral, compared with finite elements
-Grid = tuple[Floats, int]  # as of `sample_grid`
+Grid = tuple[Floats, int]  # see `sample_grid`
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
 REQUESTED = "as requested"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Request:
-    """A scene with the `model` that was requested or chosen for it, for a stated `reason`."""
+    """A scene, the `model` requested or chosen for it, and the `reason`."""
 
     scene: Scene
     options: SolveOptions
@@ -53,7 +53,7 @@ class _Request:
         return self.options.tolerance
 
     def model_row(self, start: float = 0.0, method: str = "") -> PlanRow:
-        """Return the row of the model, with the relative error of a start that it leaves out."""
+        """Return the row of the model, with the relative error of the start if it is left out."""
         reason = f"{self.reason} ({method})" if method else self.reason
         if start:
             reason += f"; leaves out the initial transient, {change_text(start)}"
@@ -66,7 +66,7 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     Parameters
     ----------
     scene : Scene
-    options : SolveOptions; with both a model and h the whole body is modelled, and h alone selects
+    options : SolveOptions; with both a model and h, the whole body is modelled; h alone selects
         elements for a sheet
 
     Returns
@@ -76,7 +76,8 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     Raises
     ------
     ValueError
-        If the model is unknown or does not take the scene, or the times, h or dt do not fit it.
+        If the model is unknown or does not take the scene, or if times, h or dt are not valid for
+        it.
 
     Examples
     --------
@@ -104,7 +105,7 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
 
 
 def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
-    """Check the request and return it with its model, or the one chosen for the scene."""
+    """Check the request, and return it with the requested or a chosen model."""
     requested = None if options.model == "auto" else named(options.model)
     if options.dt is not None:
         step_count(float(sample_times(scene)[-1]), options.dt)
@@ -127,7 +128,7 @@ def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
 
 
 def chosen_model(scene: Scene, tolerance: float = 0.05, grid: Grid | None = None) -> str:
-    """Return the name of the cheapest model within the tolerance, for times as of `sample_grid`,
+    """Return the name of the cheapest model within the tolerance, for the times of a `sample_grid`,
     by default those of the scene. Raises a ValueError if no model takes the scene.
     """
     if not scene.body.of_kind.discretise:
@@ -161,7 +162,7 @@ def _cheapest(scene: Scene, tolerance: float, grid: Grid) -> tuple[Model, str]:
 
 
 def why_modes(scene: Scene, tolerance: float) -> str:
-    """Return the reason for plate modes instead of elements; "" if elements are better."""
+    """Return the reason to use plate modes instead of elements; "" if elements are better."""
     body = scene.body
     if not takes(FROM_REST, scene) or tolerance < ERROR:
         return ""
@@ -183,7 +184,7 @@ def _why_elements(scene: Scene) -> str:
 
 @lru_cache(maxsize=64)
 def _reflections(scene: Scene) -> float:
-    """Return the reflections from the sides that a wavenumber integral leaves out."""
+    """Return the relative size of reflections that a wavenumber integral leaves out."""
     return (
         estimates.side_reflections(scene)
         if estimates.has_wavenumber_solution(scene)
@@ -266,7 +267,7 @@ def _plan_wavenumber_integral(request: _Request) -> Plan:
 
 
 def _plan_elements(request: _Request) -> Plan:
-    """Plan linear elements: extent, mesh, and the errors that remain."""
+    """Plan linear elements: extent, mesh, and remaining errors."""
     scene, model, tolerance = request.scene, request.model, request.tolerance
     options, (times, _) = request.options, request.grid
     highest, line_row = _highest_line(scene, tolerance)
@@ -319,7 +320,7 @@ def _step_part(scene: Scene, dt: float | None) -> ErrorPart:
 
 
 def _with_series(planned: Plan, request: _Request) -> Plan:
-    """Return the plan with the error of Prony series, if its model takes them for modulus laws."""
+    """Add the error of Prony series to a plan, if its model uses them for modulus laws."""
     scene, tolerance = request.scene, request.tolerance
     part = errors.series_part(scene, planned.model, tolerance, planned.prepared)
     if part is None:

@@ -1,4 +1,4 @@
-"""Warnings of a response that is not what was requested, apart from its expected error."""
+"""Warnings of a response that differs from the request, apart from its expected error."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ WEAK_LINE_RATIO = 0.05  # of the strongest line of a load: no warning if weaker 
 def response_warnings(
     scene: Scene, response: Response, predicted: float, tolerance: float
 ) -> tuple[str, ...]:
-    """Return the warnings of a response other than those of its plan with the error `predicted`."""
+    """Return warnings of a response beyond those of its plan, with its `predicted` error."""
     return (
         *larger_error(scene, response, predicted, tolerance),
         *stretching(scene, response, tolerance),
@@ -38,7 +38,7 @@ def response_warnings(
 def larger_error(
     scene: Scene, response: Response, predicted: float, tolerance: float
 ) -> tuple[str, ...]:
-    """Warn of an error that the model measured above the tolerance and above the prediction."""
+    """Warn of an error measured by the model above both tolerance and prediction."""
     error = response.expected_error
     if not error > np.fmax(predicted, tolerance):
         return ()
@@ -104,7 +104,7 @@ def implausible(scene: Scene) -> tuple[str, ...]:
 
 
 def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
-    """Warn of rigid-body drift under a load with non-zero mean."""
+    """Warn of rigid-body drift under a load whose mean is not 0."""
     if scene.body.is_held or not mean_gain(scene):
         return ()
     half_space = ", or set thickness_mm = inf" if scene.body.of_kind.is_layer else ""

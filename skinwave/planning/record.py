@@ -1,4 +1,4 @@
-"""Plan of a simulation, with a reason for each decision."""
+"""Plan of a simulation, with the reason for each decision."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class Plan:
     Attributes
     ----------
     model : str, name of the model
-    body : Body, the part of the scene's body that is modelled
-    symmetry : str, axes of "xy" across which the body is halved
+    body : Body, the modelled part of the scene's body
+    symmetry : str, axes out of "xy" across which the body is halved
     h : float or None, element size in m; None without a mesh
     highest : float, highest relevant line of the load in Hz
     error : float, expected relative error
     seconds, memory : float, predicted cost of the first response in s and bytes
     rows : tuple of PlanRow, the decisions with their reasons
-    warnings : tuple of str, one sentence for each part of the request that is not met
+    warnings : tuple of str, a sentence for each part of the request that is not met
     prepared : ReducedBody or None, the body reduced on the planned mesh
     options : SolveOptions, the request
 
@@ -62,7 +62,7 @@ class Plan:
     options: SolveOptions = field(default=DEFAULT, repr=False)
 
     def table(self) -> dict[str, Any]:
-        """Return the plan as JSON values, without the reduced body and the options."""
+        """Return the plan as values for JSON, without the reduced body and the options."""
         values = asdict(replace(self, prepared=None, options=DEFAULT))
         return {key: value for key, value in values.items() if key not in ("prepared", "options")}
 

@@ -1,10 +1,10 @@
 """Mesh refinement with Richardson error estimates, because no a-priori law holds for every scene.
 
-Near a resonance, a mesh that is a little too stiff changes the waveform many times as much as
-elsewhere, and soft or thin bodies need more elements than stiff ones. The error of each mesh in a
-sequence is extrapolated from the change to the mesh before, and a controller chooses the next size.
-All axes are refined alike, because a slab has few layers of cells and one more layer changes the
-result as much as the refinement along the surface.
+Near a resonance, the small excess stiffness of a mesh changes the waveform much more than
+elsewhere. Soft or thin bodies need more elements than stiff ones. The error of each mesh in a
+sequence is extrapolated from the change since the previous mesh, and a controller chooses the next
+size. All axes are refined alike, because a slab has few layers of cells and one more layer changes
+the result as much as the refinement along the surface.
 """
 
 from dataclasses import dataclass
@@ -33,14 +33,14 @@ FINEST = 0.4  # of the default element size: the finest that is tried
 class SizeController:
     """Controller of the element size h by Richardson extrapolation of an error ~ h^order.
 
-    The error of a mesh is its relative change from one with elements r times as large, over
-    r^order - 1, times `margin`. The next size is h (safety tolerance / error)^(1/order).
-    Roache, Annu Rev Fluid Mech 29:123 (1997); ASME V&V 20 (2009), section 2.
+    The error of a mesh is the relative change from a mesh with elements r times as large, divided
+    by r^order - 1, times `margin`. The next size is h (safety tolerance / error)^(1/order). Roache,
+    Annu Rev Fluid Mech 29:123 (1997); ASME V&V 20 (2009), section 2.
 
     The `order` of convergence of a waveform was measured at 1.9 to 3.5. The `margin` covers clamped
-    edges, jumps of material and coarse meshes, where true errors were up to 1.4 times as large. The
-    `safety` factor on the tolerance makes one more mesh enough. `largest_factor` limits the ratio
-    of two sizes, because coarse meshes overestimate their errors.
+    edges, jumps of material and coarse meshes, where true errors were up to 1.4 times as large.
+    With the `safety` factor on the tolerance, one more mesh is usually enough. `largest_factor`
+    limits the ratio of two sizes, because coarse meshes overestimate their errors.
     """
 
     order: float = 2.25
@@ -49,16 +49,16 @@ class SizeController:
     largest_factor: float = 1.6
 
     def error(self, other: Array, values: Array, ratio: float) -> float:
-        """Return the error of a quantity (k, p) from that of a mesh `ratio` times as coarse."""
+        """Return the error of values (k, p), given those of a mesh `ratio` times as coarse."""
         change = float(relative_changes(values - other, values).max())
         return self.margin * change / abs(ratio**self.order - 1)
 
     def size(self, h: float, error: float, tolerance: float) -> float:
-        """Return the element size in m that meets a tolerance, from the error with h."""
+        """Return the element size in m that meets a tolerance, given the error at h."""
         return h * (self.safety * tolerance / error) ** (1 / self.order)
 
     def nearest(self, sizes: Floats, h: float, error: float, tolerance: float) -> float:
-        """Return the next of a sequence of sizes in m after h."""
+        """Return the size in m that follows h in a sequence."""
         wanted = max(self.size(h, error, tolerance), h / self.largest_factor)
         return float(sizes[np.abs(np.log(sizes / wanted)).argmin()])
 
@@ -68,8 +68,8 @@ CONTROLLER = SizeController()
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refined:
-    """Refined mesh: its element size `h` in m, the expected relative `error` as of `mesh_error`,
-    the size in m that it was `compared` with, and its reduced body.
+    """Refined mesh: its element size `h` in m, its expected relative `error` from `mesh_error`, the
+    size in m that it was `compared` with, and its reduced body.
     """
 
     h: float
@@ -81,8 +81,8 @@ class Refined:
 def refine(
     scene: Scene, body: Body, options: SolveOptions = DEFAULT, *, symmetry: str = ""
 ) -> Refined:
-    """Return the coarsest mesh of a sequence that meets the tolerance, or else the finest; or the
-    mesh of a given h. The `body` is the scene's, or a part of it.
+    """Return the coarsest mesh of a sequence that meets the tolerance, the finest mesh if none
+    does, or the mesh of a given h. `body` is the scene's body or a part of it.
 
     Raises a ValueError if the body has no mesh of that size.
     """
@@ -134,13 +134,13 @@ def element_sizes(body: Body) -> Floats:
 
 
 def finer_sizes(sizes: Floats, size: float) -> Floats:
-    """Return the sizes of a sequence that are finer than one by `RATIO` or more; or the last."""
+    """Return the sizes that are finer than a size by `RATIO` or more, or the last size."""
     coarser = np.count_nonzero(sizes > size / RATIO * (1 + 1e-9))
     return sizes[min(coarser, len(sizes) - 1) :]
 
 
 def comparison_size(body: Body, h: float) -> float:
-    """Return a size to compare a given one with: coarser, or finer than a single layer."""
+    """Return a size in m to compare h with: coarser, or finer if h gives a single layer."""
     if actual := body.of_kind.actual_size:
         sizes = (h * np.geomspace(1, 4, 80)).tolist() + (h / np.geomspace(1, 4, 80)).tolist()
         far = (s for s in sizes if abs(np.log(actual(body, s) / actual(body, h))) > np.log(RATIO))
@@ -153,19 +153,19 @@ def comparison_size(body: Body, h: float) -> float:
 
 
 def _has_cell_layers(body: Body) -> bool:
-    """Whether the size alone sets the number of cells through the depth, not the body's layers."""
+    """Whether the element size alone, not the body's layers, sets the number of cells in depth."""
     return body.of_kind.is_layer and len(body.strata) == 1
 
 
 def _layered_size(body: Body, layers: int, near: float) -> float:
-    """Return the size in m near another for about so many layers of cells in a slab."""
+    """Return the size in m near a given one for a number of layers of cells in a slab."""
     sizes = (near * 2 ** np.linspace(-1, 1, 101)).tolist()
     return min(sizes, key=lambda h: (abs(cell_layers(body, h) - layers), abs(np.log(h / near))))
 
 
 def refinement_ratio(body: Body, other: float, h: float) -> float:
-    """Return the refinement ratio of two meshes: that of their sizes in m, or of their cells on
-    average of all axes where these differ less, because short sides have few cells.
+    """Return the refinement ratio of two meshes: that of their sizes in m or, if smaller, the mean
+    ratio of their cells along all axes, because short sides have few cells.
     """
     if actual := body.of_kind.actual_size:
         return actual(body, other) / actual(body, h)
@@ -178,13 +178,13 @@ def refinement_ratio(body: Body, other: float, h: float) -> float:
 
 
 def about_its_rest(scene: Scene, waveforms: Array) -> Array:
-    """Return waveforms (t, p) without the mean under gravity, which would hide errors."""
+    """Return waveforms (t, p), without their mean under gravity, which would hide errors."""
     return waveforms - waveforms.mean(axis=0) if scene.load.gravity else waveforms
 
 
 def quantity_of_interest(prepared: ReducedBody, scene: Scene, response: Response) -> Array:
-    """Return the quantity of interest of a reduced body: its waveforms (t, p), or for an
-    unconstrained body the lines (f, p c) without the mean, whose drift would hide the rest.
+    """Return the quantity of interest of a reduced body: its waveforms (t, p) or, for an
+    unconstrained body, the lines (f, p c) without the mean, because its drift would hide the rest.
     """
     if scene.body.is_held:
         return about_its_rest(scene, response.values)
@@ -192,11 +192,11 @@ def quantity_of_interest(prepared: ReducedBody, scene: Scene, response: Response
 
 
 def above_band(waveforms: Floats, step: float) -> float:
-    """Return the error of waveforms (t, p), sampled in steps in s, by motion above `BAND`.
+    """Return the error of waveforms (t, p), sampled at a step in s, due to motion above `BAND`.
 
-    Velocity and acceleration have such a part where a load begins, or jumps, abruptly. The part of
-    a reduced body is as large as the true one but otherwise unrelated, so that the error is the
-    root of twice the share of the energy. A series of cosines continues the record without a jump
+    Velocity and acceleration have such a part where a load begins, or jumps, abruptly. In a reduced
+    body this part is as large as the true one, but otherwise unrelated. The error is therefore the
+    root of twice its share of the energy. A series of cosines continues the record without a jump
     at its ends.
     """
     energy = fft.dct(waveforms, axis=0, norm="ortho") ** 2
@@ -209,8 +209,8 @@ def above_band(waveforms: Floats, step: float) -> float:
 def mesh_error(
     body: Body, sizes: tuple[float, float], quantities: tuple[Array, Array], *, same: bool
 ) -> float:
-    """Return the error of the second of two element sizes in m, from their quantities of interest
-    (k, p). If both give the `same` mesh, it is 1, or nan for the one mesh of a file.
+    """Return the error at the second of two element sizes in m, from their quantities of interest
+    (k, p). If both give the `same` mesh, it is 1, or nan for a mesh from a file.
     """
     if same:
         return np.nan if body.file else 1.0
@@ -218,6 +218,6 @@ def mesh_error(
 
 
 def enough(body: Body, h: float, error: float, tolerance: float) -> float:
-    """Return the element size in m that meets a tolerance, from the error with h."""
+    """Return the element size in m that meets a tolerance, given the error at h."""
     size = min(h, body.depth if body.of_kind.is_layer else h)
     return CONTROLLER.size(size, max(CONTROLLER.safety * tolerance, error), tolerance)

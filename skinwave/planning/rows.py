@@ -20,7 +20,7 @@ LOWEST_AIR_FREQUENCY = 20.0  # Hz at which air is estimated if no line is higher
 def element_rows(
     scene: Scene, tolerance: float, axes: str, mesh: Refined, highest: float, h: float | None
 ) -> list[PlanRow]:
-    """Return the rows of elements: `axes` of symmetry, `highest` line in Hz, requested size h."""
+    """Return the rows of elements for symmetry `axes`, a `highest` line in Hz and a given h."""
     effort = mesh.prepared.effort
     cached = "" if "factorise and reduce" in effort.seconds else " (read from the cache)"
     return [
@@ -78,7 +78,7 @@ def _size_row(mesh: Refined, tolerance: float, h: float | None) -> PlanRow:
 
 
 def coat_rows(body: Body, h: float) -> list[PlanRow]:
-    """Return the rows of the top layers that are a coat, and of those that have elements."""
+    """Return the rows of the top layers: those in a coat, and those with elements."""
     shell = coat(body, h)
     coated = len(shell.materials) if shell else 0
     layers = list(zip(body.strata, thicknesses(body.strata), strict=True))[:-1]
@@ -115,7 +115,7 @@ def coat_rows(body: Body, h: float) -> list[PlanRow]:
 
 
 def neglected_rows(scene: Scene, highest: float) -> list[PlanRow]:
-    """Return the rows of air and stretching of a sheet, with lines up to the `highest` in Hz."""
+    """Return the rows of air and stretching of a sheet under lines up to `highest` in Hz."""
     body = scene.body
     if not body.of_kind.is_plate:
         return []

@@ -34,8 +34,9 @@ def simulate(
 ) -> Response:
     """Simulate a scene: compute the quantity that its probes read, with its expected error.
 
-    If part of the request is not met, a `SkinwaveWarning` says so, and `effort.warnings` of the
-    response keeps the sentence. The error of elements is estimated on a second, coarser mesh.
+    For each part of the request that is not met, a `SkinwaveWarning` is issued and added to
+    `effort.warnings` of the response. The error of elements is estimated with a second, coarser
+    mesh.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def simulate(
 
 
 def solve(scene: Scene, planned: Plan) -> Response:
-    """Solve a scene as planned, and check the response; raises what `simulate` does."""
+    """Solve a scene as planned, and check the response; raises the errors of `simulate`."""
     options = replace(planned.options, model=planned.model, h=planned.h or planned.options.h)
     if planned.prepared and named(planned.model).is_reduced:
         times, first = sample_grid(scene, options.times)
@@ -84,15 +85,15 @@ def solve(scene: Scene, planned: Plan) -> Response:
 
 
 def compute(scene: Scene, model: str, **options: Any) -> Response:
-    """Solve a scene by one model, without a plan or warnings; `options` are of `SolveOptions`.
+    """Solve a scene by one model, without a plan or warnings; see `SolveOptions` for `options`.
 
-    The expected error is unknown unless the model measures it. Raises what `simulate` does.
+    The expected error is unknown unless the model measures it. Raises the errors of `simulate`.
     """
     return _solve_by_model(scene, SolveOptions(model=model, **options))
 
 
 def _solve_by_model(scene: Scene, options: SolveOptions) -> Response:
-    """Return the response of a model with its default mesh, or that of the options."""
+    """Return the response of a model, on its default mesh or that of the options."""
     model = named(options.model)
     check_takes(model, scene)
     if model.needs_body:

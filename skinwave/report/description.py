@@ -1,4 +1,4 @@
-"""Sentences that describe a scene, the models that were run, and what these leave out."""
+"""Sentences about a scene, the models that were run, and what these leave out."""
 
 from collections.abc import Iterable, Sequence
 
@@ -29,7 +29,7 @@ def _spot(pressure: MovingPressure) -> str:
 
 
 def model_paragraphs(runs: Sequence[Run]) -> list[str]:
-    """Return a paragraph for each body and model, and notes that are true of all."""
+    """Return a paragraph for each body and model, and notes that apply to all."""
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
         groups.setdefault((run.body, run.model), []).append(run)
@@ -50,7 +50,7 @@ def unresolved_lines(runs: Iterable[Run]) -> list[str]:
 
 
 def _model_text(runs: list[Run]) -> str:
-    """Describe the model of one body, its load, the body, and what is left out."""
+    """Describe the model of one body, its load, the body, and what the model leaves out."""
     scene, model, name = runs[0].scene, named(runs[0].model), run_label(runs[0])
     acting, body = scene.load, scene.body
     drive = scene.pressure.law.name.replace("_", " ")
@@ -131,7 +131,7 @@ def tone_texts(tacton: Tacton) -> list[str]:
 
 
 def level_texts(tacton: Tacton) -> list[str]:
-    """Describe amplitude, rhythm and sampled signal, where present."""
+    """Describe amplitude, rhythm and sampled signal, if present."""
     parts = [f"{100 * tacton.amplitude:g} % of full drive"] * (tacton.amplitude != 1)
     if tacton.rhythm:
         rhythm = tacton.rhythm
@@ -169,7 +169,7 @@ def layers_text(body: Body) -> str:
 
 
 def material_text(solid: Material | str) -> str:
-    """Describe a material by its constants, or by its name."""
+    """Describe a material by its constants or its name."""
     if isinstance(solid, str):
         return solid
     text = f"density {solid.density:g} kg/m³, "
@@ -219,7 +219,7 @@ def no_kernel_text(scene: Scene) -> str:
 
 
 def quantity_notes(scene: Scene) -> list[str]:
-    """Return notes for a page of a scene whose probes do not read displacement of the surface."""
+    """Return notes for a page of a scene whose probes do not read the surface displacement."""
     if scene.reading.is_plain:
         return []
     return [

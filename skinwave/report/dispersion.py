@@ -107,7 +107,7 @@ def _draw_curves(axes: Sequence[Axes], curves: DispersionCurves, focus_speed: fl
 
 
 def _shapes(figure: SubFigure, curves: DispersionCurves, at: float) -> None:
-    """Draw displacement over depth of the least evanescent modes, in phase with the surface."""
+    """Draw the displacement of the least evanescent modes over depth, in phase with the surface."""
     axes = figure.subplots(2, 1, sharex=True, sharey=True)
     number = int(np.argmin(np.abs(curves.frequencies - at)))
     known = [n for n, mode in enumerate(curves.modes) if mode.kinds[number]]

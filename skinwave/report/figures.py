@@ -30,7 +30,7 @@ def png(figure: Figure, dpi: int = 110) -> bytes:
 
 
 def figure_file(figure: Figure, kind: str, dpi: int = 110) -> bytes:
-    """Return a figure as a file of a kind: "png", "svg" or "pdf". Text stays text."""
+    """Return a figure as a "png", "svg" or "pdf" file. Text remains text."""
     buffer = BytesIO()
     figure.dpi = dpi
     with warnings.catch_warnings(), mpl.rc_context(TEXT):
@@ -57,7 +57,7 @@ def with_style(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 def panels(count: int, style: Style, width: float) -> tuple[Figure, list[Axes]]:
     """Return a figure and axes of `count` maps in mm: in a row, or in a column if it is narrow.
 
-    `width` is that of a map with its colour bar, in inch, for letters of 10 points.
+    `width` is that of a map with its colour bar, in inches, for letters of 10 points.
     """
     size = style.size(width * count, 0.85 * width + 0.4 + 0.1 * count)
     if style.is_narrow:
@@ -103,7 +103,7 @@ def line_symbol(name: str) -> str:
 def name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int = 1) -> None:
     """Write names of lines above a panel that is `width` points wide, in a few rows.
 
-    `lines` are frequencies in Hz by name. The first ones that have room are named and marked.
+    `lines` are frequencies in Hz by name. Those with room are named and marked, first ones first.
     """
     size, occupied = small(), [list[tuple[float, float]]() for _ in range(rows)]
     to_axes = ax.transScale + ax.transLimits

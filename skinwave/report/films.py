@@ -29,7 +29,7 @@ def film(
 ) -> None:  # fmt: skip
     """Write a film of one period of the steady state, with the views side by side.
 
-    It repeats without a jump if the load is periodic. Raises what `check_format` raises.
+    It repeats without a jump if the load is periodic. Raises the errors of `check_format`.
     """
     check_format(path)
     count, report = len(views[0].times), progress or silent
@@ -58,7 +58,7 @@ def check_format(path: Path) -> None:
 
 
 def played_text(view: View) -> str:
-    """Describe the played part of a view's motion, and whether it repeats without a jump."""
+    """Describe which part of a motion is played, and whether it repeats without a jump."""
     span, whole = f"{significant(1e3 * view.period)} ms", playback.whole_period(view.scene.pressure)
     jump = playback.phase_jump(view.scene.tacton, view.period)
     if jump < ROUND_OFF:
@@ -74,7 +74,7 @@ def duration(frames: int) -> float:
 
 
 def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
-    """Write a GIF with one palette for all frames, so that still parts do not flicker."""
+    """Write a GIF with one palette for all frames; parts at rest do not flicker."""
     from PIL import Image as Pillow
 
     some = Pillow.fromarray(np.concatenate(frames[:: max(1, len(frames) // 4)]))

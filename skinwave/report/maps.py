@@ -56,8 +56,8 @@ def surfaces_figure(
 ) -> Figure:
     """Draw maps of RMS vibration and the path of the focus.
 
-    `surfaces` are maps by column, or one map by its title. If the point kernel is among them, its
-    region is outlined on all. `measured` values are drawn in the colours of maps of displacement.
+    `surfaces` are maps by column, or one map by its title. If there is a point kernel, its region
+    is outlined on all maps. `measured` values have the colours of maps of displacement.
     """
     kernel = next((each for each in surfaces.values() if each.quantity is PRESSURE), None)
     alone = len(surfaces) == 1
@@ -114,7 +114,7 @@ def _draw_border(
 def _draw_measured(
     ax: Axes, surface: SurfaceField, image: AxesImage, measured: MeasuredPlaces
 ) -> Literal["neither", "max"]:
-    """Draw measured places on a map; return how its colour bar is to be extended."""
+    """Draw measured places on a map; return the `extend` option of its colour bar."""
     low, high = ((surface.x[end], surface.y[end]) for end in (0, -1))
     within = ((measured.places >= low) & (measured.places <= high)).all(axis=1)
     x, y = 1e3 * measured.places[within].T
@@ -150,10 +150,10 @@ def interpolation(view: View, places: Floats) -> Callable[[Floats], Floats]:
 
 @with_style
 def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Figure:
-    """Draw the surface of each model over its own largest motion, at a few times.
+    """Draw the surface of each model relative to its largest motion, at a few times.
 
-    The first time is when the last model moves most. The others follow at equal parts of a turn of
-    the focus or, if it rests, of a period of the strongest tone.
+    At the first time the last model moves most. The others divide a turn of the focus or, if it
+    rests, a period of the strongest tone into equal parts.
     """
     count = min(count, 2) if style.is_narrow else count
     frames = _snapshot_frames(views[-1], count)

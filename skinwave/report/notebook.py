@@ -95,7 +95,7 @@ def scene_page(scene: "Scene") -> str:
 
 
 def plan_page(plan: "Plan") -> str:
-    """Return a page with the modelled body and every choice of a plan with its reason."""
+    """Return a page with the modelled body, and every choice of a plan with its reason."""
 
     def draw(figure: "Figure") -> None:
         ax = figure.subplots()
@@ -189,7 +189,7 @@ def _draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
 
 
 def _draw_foci(ax: "Axes", scene: "Scene") -> None:
-    """Draw the contour of half the pressure at every focus at the start."""
+    """Draw the contour of half the pressure around every focus at the start."""
     tacton, width = scene.tacton, spot_width(scene.pressure.height)
     phases = np.mod(tacton.trajectory.phase(0.0) + np.array(tacton.foci), 1.0)
     across = SPOT_REACH * width * np.linspace(-1, 1, 81)

@@ -1,4 +1,4 @@
-"""Three-dimensional pictures of views (pyvista, off screen): side by side, cut open, from above.
+"""Three-dimensional pictures of views (pyvista, off screen): side by side, cut open, or from above.
 
 Lengths are in mm. Cameras have no perspective, so that one scale bar is valid everywhere.
 """
@@ -37,8 +37,8 @@ LIFT = 0.4  # mm, of path, probes and focus above the surface
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Panel:
-    """Geometry of one view: triangles of its surface with their nodes (n,), marks that move with
-    it, the focus, the interpolation to the focus at every frame, and the exaggeration.
+    """Geometry of one view: triangles of its surface and their nodes (n,), marks that move with it,
+    the focus, the interpolation to the focus in every frame, and the exaggeration.
     """
 
     view: View
@@ -60,7 +60,7 @@ def exaggeration(view: View) -> float:
 
 
 def scale_text(view: View) -> str:
-    """Return the exaggeration of the motion as text and, if it is not the motion, the colour."""
+    """Return the exaggeration as text and, unless it shows the motion, what the colour shows."""
     factor = exaggeration(view)
     if not factor:
         return "pressure, no motion"
@@ -74,7 +74,7 @@ def picture(
 ) -> Image:  # fmt: skip
     """Return a picture (height, width, 3) of views side by side, from one of `CAMERAS`.
 
-    With `cut`, the half of each body that is nearer to the camera is left out.
+    With `cut`, the half of each body nearer to the camera is omitted.
     """
     width, height = style.panel
     larger = max(1.0, WIDTH / (len(views) * width + COLUMN * height))
@@ -90,8 +90,8 @@ def stage(
 ) -> Iterator[Callable[[int], Image]]:  # fmt: skip
     """Context manager that builds a plotter once and yields a function from a frame to a picture.
 
-    All views have one colour scale: motion into the body over each model's largest or, for a single
-    view, motion in its unit; another quantity in its unit, from 0 if it has no sign.
+    All views share a colour scale: motion into the body relative to the largest of each model or,
+    for a single view, in its unit; other quantities in their unit, from 0 if they have no sign.
     """
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
@@ -246,7 +246,7 @@ def _add_scale_bar(plotter: Any, view: View, style: Style, small: float) -> None
 
 
 def _set_camera(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
-    """Set one camera and light for all panels, as far away as the widest body needs."""
+    """Set one camera and light for all panels, at the distance that the widest body needs."""
     import pyvista as pv
 
     direction, aim, height = CAMERAS[camera]
@@ -265,7 +265,7 @@ def _set_camera(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
 
 
 def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
-    """Move every panel to a frame, with a colour scale that ends at `limit`."""
+    """Show a frame in every panel, with a colour scale up to `limit`."""
     for panel in panels:
         view = panel.view
         motion = np.asarray(view.motion[frame], np.float64)

@@ -14,7 +14,7 @@ TIMEOUT = 60.0  # s
 
 @dataclass(frozen=True, kw_only=True)
 class Renderer:
-    """Whether there is a renderer; its name, or why there is none and what to do."""
+    """Whether there is a renderer, and its name, or the reason why not and a cure."""
 
     is_available: bool
     detail: str

@@ -1,4 +1,4 @@
-"""Figures of waveforms and spectral lines: of models, of detection thresholds, of measurements."""
+"""Figures of waveforms and spectral lines of models and measurements, with thresholds."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -100,7 +100,7 @@ def _legend(figure: Figure, runs: list[Run]) -> int:
 
 
 def _common_end(run: Run, runs: list[Run]) -> slice:
-    """Return the last part that all runs have; their records may begin at different times."""
+    """Return the slice at the end that all runs have; records may begin at different times."""
     times = run.response.times
     end = min(float(other.response.times[-1]) for other in runs)
     if end - SHOWN < times[0]:
@@ -110,7 +110,7 @@ def _common_end(run: Run, runs: list[Run]) -> slice:
 
 
 def _remove_mean(run: Run, runs: list[Run]) -> Floats:
-    """Return the shown part (t, p) of the response about its mean in the steady state."""
+    """Return the drawn part (t, p) of the response about its mean in the steady state."""
     motion = run.response.values
     return motion[_common_end(run, runs)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
 
@@ -192,7 +192,7 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
 
 
 def strongest_probe(runs: Sequence[Run]) -> int:
-    """Return the index of the probe that moves most, relative to the largest of each run."""
+    """Return the index of the probe that moves most, relative to the largest motion of each run."""
     level = [np.ptp(run.response.values, axis=0) for run in runs]
     return int(np.argmax(sum(x / max(float(x.max()), 1e-300) for x in level)))
 
@@ -200,7 +200,7 @@ def strongest_probe(runs: Sequence[Run]) -> int:
 def sensation_levels(run: Run, probe: int) -> dict[str, float]:
     """Return the levels of lines at a probe in dB above threshold, the highest first.
 
-    The dictionary is empty unless the body is skin.
+    It is empty unless the body is skin.
     """
     if not run.is_skin:
         return {}
@@ -311,6 +311,6 @@ def _draw_noise(left: Axes, right: Axes, size: Floats, noise: Floats) -> None:
 
 
 def _markers(column: str) -> dict[str, Any]:
-    """Return the marker of a column; a cross is replaced by a filled one, which can be open."""
+    """Return the marker of a column; crosses, which cannot be open, are replaced."""
     kind = marker(column).replace("x", "X")
     return {"color": ink_colour(column), "ls": "", "ms": 6, "marker": kind}

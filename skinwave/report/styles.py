@@ -18,8 +18,8 @@ ONE_COLUMN = 6.5  # inch, with letters of 10 points: wider figures span two colu
 @dataclass(frozen=True, kw_only=True)
 class Style:
     """Style of pictures: colours of paper and ink, font size in points, dots per inch, widths in
-    inch of one and of two columns of a printed page, size in pixels of a model in three dimensions,
-    and the factor by which three-dimensional pictures are finer.
+    inches of one and of two columns of a printed page, size in pixels of a model in three
+    dimensions, and the factor of resolution for three-dimensional pictures.
     """
 
     paper: str = "#ffffff"
@@ -41,7 +41,7 @@ class Style:
         return self.columns is not None and max(self.columns) < NARROW
 
     def size(self, width: float, height: float) -> tuple[float, float]:
-        """Return the size in inch of a figure that has this size with letters of 10 points."""
+        """Return the size in inches of a figure that has a given size with letters of 10 points."""
         if self.columns is None:
             return width * self.zoom, height * self.zoom
         column = self.columns[width > ONE_COLUMN]
@@ -71,7 +71,7 @@ STYLES = {
 def style(name: str, width: float | None = None) -> Style:
     """Return a style by name.
 
-    With a width in inch all figures have that width and the letters of print, in the colours of
+    With a width in inches, all figures have this width and the letters of print, in the colours of
     the named style. Raises a ValueError if the style is unknown or the width out of range.
     """
     chosen = STYLES[choose("style", name, STYLES)]
@@ -94,8 +94,15 @@ def paper(width: float = 3.5, height: float | None = None) -> Iterator[None]:
 
     Parameters
     ----------
-    width : float, inch
-    height : float, inch, 0.7 of the width by default
+    width : float, inches
+    height : float, inches, 0.7 times the width by default
+
+    Raises a ValueError if the width is out of range.
+
+    >>> import matplotlib, skinwave
+    >>> with skinwave.paper(width=7.0, height=3.0):
+    ...     matplotlib.rcParams["figure.figsize"]
+    [7.0, 3.0]
     """
     import matplotlib as mpl
 

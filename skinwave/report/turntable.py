@@ -1,4 +1,4 @@
-"""A page with a view that can be turned in a browser; it uses the code of the live page."""
+"""A page with a view that can be rotated in a browser, with the code of the live page."""
 
 import base64
 from importlib import resources

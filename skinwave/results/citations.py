@@ -52,7 +52,7 @@ def cite(*responses: Response) -> Citations:
     Raises
     ------
     ValueError
-        If no response is given, or a model is unknown.
+        If no response is given or a model is unknown.
 
     Examples
     --------

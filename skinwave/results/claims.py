@@ -28,8 +28,8 @@ NO_PEAK = "a line that the claim is about has no spectral peak next to it"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinesByName(OfTacton):
-    """Measured lines by name, with the attributes of a `Run` that claims need, and the `radius`
-    (p,) of the confidence circle of each amplitude. `spectrum` is empty if only lines are known.
+    """Measured lines by name: the attributes of a `Run` that claims use, and the `radius` (p,) of
+    the confidence circle of each amplitude. `spectrum` is empty if only lines are known.
     """
 
     tacton: str
@@ -69,7 +69,7 @@ class AssessedClaim:
 
 
 def evaluate(runs: Iterable[Run]) -> list[AssessedClaim]:
-    """Assess every claim for every body and model whose runs resolve the lines that it is about."""
+    """Assess every claim for each body and model whose runs resolve its lines."""
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in filter(is_single, runs):
         groups.setdefault((run.body, run.model), []).append(run)
@@ -291,7 +291,7 @@ def rival_levels(run: NamedLines, velocity: bool = False) -> Floats:
 
 def multiple_levels(run: NamedLines) -> Floats:
     """Return the level of the strongest multiple of f_AM or f_d other than f_AM at each probe, in
-    dB re f_AM there. Sums and differences of both are not "these frequency harmonics".
+    dB re f_AM there. Sums and differences of both frequencies are not "these frequency harmonics".
     """
     names = [n for n in rivals(run) if not ("f_AM" in n and "f_d" in n)]
     return _probe_levels(run, names, "f_AM").max(axis=0, initial=NO_LINE)
@@ -306,14 +306,14 @@ def strongest_rival(run: NamedLines) -> tuple[str, float]:
 
 
 def _strongest(run: NamedLines, names: list[str], reference: str = "f_AM") -> float:
-    """Return the highest level of these lines at any probe, in dB re the reference there."""
+    """Return the highest level of some lines at any probe, in dB re the reference there."""
     return float(_probe_levels(run, names, reference).max())
 
 
 def _peak(run: NamedLines, line: str) -> float:
     """Return the frequency in Hz of the spectral peak next to a line, at its strongest probe.
 
-    It is interpolated between bins on the logarithm, and infinite if there is no peak.
+    The logarithm is interpolated between bins; without a peak it is infinite.
     """
     f, amplitude = run.spectrum
     x = amplitude[:, int(np.argmax(run.lines[line]))]

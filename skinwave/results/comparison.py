@@ -24,18 +24,18 @@ class Agreement:
     Parameters
     ----------
     relative_l2 : (p,) float, relative L2 misfit of the waveform at each probe
-    scale : float, factor applied to the candidate first: 1 if both have the same quantity,
-        otherwise the best fit over all probes
+    scale : float, factor applied to the candidate before comparison: 1 if both have the same
+        quantity, otherwise the best fit over all probes
     shape_misfit : (p,) float, relative L2 misfit of the steady waveform about its mean, after the
         best gain and delay at each probe
-    delay : (p,) float, s, that best delay; positive if the candidate is later. It is within half a
-        period of the reference's strongest frequency
+    delay : (p,) float, s, this delay, positive if the candidate is later; within half a period of
+        the reference's strongest frequency
     line_ratios : (f, p) float, scaled candidate over reference at `frequencies`
-    phase_delay : (f, p) float, s, by which each line is later in the candidate. At the probe where
-        the line is strongest it lies between -1/4 and 3/4 of a period; it is unwrapped outwards
-        from there, and nan where either line is 20 dB below its largest
-    spread_reference, spread_candidate : {-6: m, -20: m}, distance from the strongest probe to
-        the outermost one whose RMS motion is within 6 or 20 dB
+    phase_delay : (f, p) float, s, positive if the line is later in the candidate; at the probe
+        where the line is strongest between -1/4 and 3/4 of a period, unwrapped outwards from there,
+        and nan where either line is 20 dB below its largest
+    spread_reference, spread_candidate : {-6: float, -20: float}, m, distance from the strongest
+        probe to the outermost one whose RMS motion is within 6 or 20 dB
     frequencies : (f,) float, Hz
     probes : (p, 2) float, m
 

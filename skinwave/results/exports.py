@@ -54,8 +54,8 @@ def write_field(folder: Path, view: View) -> Path:
 
     Bodies are 10-node tetrahedra with `displacement_m` (n, 3). Solid bodies also have `strain` and
     `stress_pa` (n, 6), tension positive, in the order XX, YY, ZZ, XY, YZ, XZ; a node between two
-    materials is written for each. The point kernel is a surface with `pressure_pa`. All are about
-    their mean, and the field data `units` names their units.
+    materials is written once for each. The point kernel is a surface with `pressure_pa`. All values
+    are about their mean; the field data `units` names the units.
     """
     frames = field_frames(len(view.times)) if view.tensors is None else view.tensors.frames
     names, stem = [], folder_name(view.column)
@@ -68,7 +68,7 @@ def write_field(folder: Path, view: View) -> Path:
 
 
 def _grid(view: View, frame: int, number: int) -> Any:
-    """Return one frame of a view, the `number`-th that is written, for pyvista."""
+    """Return a frame of a view, the `number`-th written one, for pyvista."""
     import pyvista as pv
 
     if not len(view.tets):

@@ -27,7 +27,7 @@ LONGEST_NAME, MOST_BYTES = 80, 200  # characters and bytes, so that an ending fi
 
 
 def folder_name(name: str) -> str:
-    """Return a scene's name as a name of a folder or file that is valid on any system."""
+    """Return a scene's name as a folder or file name that is valid on all systems."""
     plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:LONGEST_NAME]
     plain = plain.encode()[:MOST_BYTES].decode(errors="ignore").strip()
     is_reserved = plain.casefold() in ("", *RESERVED) or DEVICES.fullmatch(plain)
@@ -35,7 +35,7 @@ def folder_name(name: str) -> str:
 
 
 def distinct_names(names: Iterable[str]) -> list[str]:
-    """Return the `folder_name` of each, distinct even on systems that ignore case."""
+    """Return the `folder_name` of each name, distinct even on systems that ignore case."""
     distinct: dict[str, str] = {}
     for name in map(folder_name, names):
         other, k = name, 1
@@ -47,7 +47,7 @@ def distinct_names(names: Iterable[str]) -> list[str]:
 
 
 def write_run(folder: Path, run: Run, *, also: Callable[[Path], object] | None = None) -> None:
-    """Write the folder of one run, all or nothing; `also` writes more into it."""
+    """Write the folder of one run, or nothing if that fails; `also` writes more files into it."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     partial = outputs.temporary_path(folder, "partial")
     partial.mkdir()
@@ -96,7 +96,7 @@ def write_lines(path: Path, runs: Iterable[Run]) -> None:
 def line_rows(run: Run) -> Iterator[dict[str, Any]]:
     """Yield rows of lines.csv by column.
 
-    Peaks that are not a line of the load are named by their kind, such as "free vibration".
+    The name of a peak that is not a line of the load is its kind, such as "free vibration".
     """
     quantity = run.response.record
     lines = [(name, f, run.table.amplitudes[name]) for name, f in run.line_hz.items()]

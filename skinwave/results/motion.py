@@ -1,8 +1,8 @@
 """Steady motion of a whole meshed body, line by line, for maps, films and exported fields.
 
-Linear quantities are given about their mean. Invariants, such as the largest shear strain, are
-computed from the whole tensor including its mean, as at probes. The mean of an unconstrained body
-grows without bound; it is left out there.
+Linear quantities are about their mean. Invariants, such as the largest shear strain, are computed
+from the whole tensor including its mean, as at probes. For an unconstrained body the mean is left
+out, because it grows without bound.
 """
 
 from collections.abc import Iterator
@@ -112,7 +112,7 @@ class Shade:
 
 
 def whole_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
-    """Return the motion of a whole body at any time; raises what `skinwave.field` raises."""
+    """Return the motion of a whole body at any time; raises the errors of `skinwave.field`."""
     given = {"gravity": scene.load.gravity, "support_motion": scene.load.support_motion}
     if left_out := [key for key, value in given.items() if value]:
         raise ValueError(
@@ -149,7 +149,7 @@ def reduced_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
 
 
 def probe_lines(scene: Scene, moved: BodyMotion) -> ReducedResponse:
-    """Return the components of the probes' quantity."""
+    """Return the lines of the components of the probes' quantity."""
     rows, solids = probe_rows(scene.body, moved.build, scene.probe_points, scene.reading)
     return in_motion(read_at(moved.motion, rows @ moved.basis), scene.reading.record, solids)
 
@@ -210,7 +210,7 @@ def shade(scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints) -> Shade:
     Raises
     ------
     ValueError
-        If the quantity is not the normal motion of a sheet, is strain or stress in a coat, or has
+        For a sheet, if the quantity is not normal motion; for strain or stress in a coat; and for
         too many values.
     """
     quantity = scene.reading.record
@@ -237,7 +237,7 @@ def shade(scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints) -> Shade:
 def _of_strain(
     quantity: Quantity, lines: ReducedResponse, moved: BodyMotion, times: Floats, nodes: Ints
 ) -> Floats:
-    """Return values (t, q) of a quantity of strain; the mean of both sides between materials."""
+    """Return values (t, q) of a quantity of strain, averaged over both sides of an interface."""
     total, count = np.zeros((len(times), len(nodes))), np.zeros(len(nodes))
     for solid, own in _parts(moved):
         numbers = np.searchsorted(moved.nodes, solid.nodes[own])
@@ -252,7 +252,7 @@ def _of_strain(
 
 
 def _parts(moved: BodyMotion) -> Iterator[tuple[SolidPart, Ints]]:
-    """Yield the parts of one material each, and which of their nodes belong to the body."""
+    """Yield the parts, each of one material, and a mask of their nodes in the body."""
     for solid in solid_parts(moved.build.mesh, moved.build.material):
         own = np.flatnonzero(np.isin(solid.nodes, moved.nodes))
         if len(own):

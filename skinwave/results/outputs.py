@@ -1,4 +1,4 @@
-"""Output folders and files, which are written under a temporary name and then renamed.
+"""Output folders and files, written under a temporary name and then renamed.
 
 A folder is replaced only if skinwave wrote every file in it, which its record.json lists.
 """
@@ -59,8 +59,9 @@ def output_folder(
 def output_path(
     out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[Path]:
-    """Yield a temporary path with the same suffix, which is renamed to `out` at the end; an error
-    leaves no file. Raises a ValueError if `out` may not be overwritten or is one of the `inputs`.
+    """Yield a temporary path with the same suffix, which is renamed to `out` at the end. After an
+    error there is no file. Raises a ValueError if `out` may not be overwritten or is one of the
+    `inputs`.
     """
     out = Path(os.path.realpath(out))
     if out.is_dir():
@@ -81,13 +82,13 @@ def output_path(
 def output_file(
     out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[IO[bytes]]:
-    """Yield a file opened for writing; otherwise like `output_path`."""
+    """Yield a file opened for writing; like `output_path` in other respects."""
     with output_path(out, overwrite=overwrite, inputs=inputs) as path, open(path, "xb") as file:
         yield file
 
 
 def temporary_path(out: Path, kind: str) -> Path:
-    """Return a unique path in the folder of `out`."""
+    """Return an unused path in the folder of `out`."""
     return out.with_name(f"{out.name[:LONGEST_PREFIX]}.{kind}-{secrets.token_hex(4)}")
 
 
@@ -120,7 +121,7 @@ def listed_files(folder: Path) -> dict[str, str] | None:
 def foreign_file(folder: Path) -> Path | None:
     """Return the first file below a folder that was added or changed after skinwave wrote it.
 
-    A report within the folder has its own list.
+    A report within the folder has a list of its own.
     """
     records, listed = set[Path](), dict[Path, str]()
     for home in (folder, folder / REPORT):
@@ -140,7 +141,7 @@ def is_unchanged(path: Path, sha: object) -> bool:
 
 
 def _check_replaceable(out: Path, overwrite: bool, inputs: Iterable[str | Path]) -> None:
-    """Raise a ValueError if a target exists, unless it may be replaced and is all skinwave's."""
+    """Raise a ValueError if a target exists, unless it is skinwave's own and may be replaced."""
     try:
         out.lstat()  # raises an OSError now if the name is too long
     except FileNotFoundError:
@@ -166,7 +167,7 @@ def _check_replaceable(out: Path, overwrite: bool, inputs: Iterable[str | Path])
 
 
 def _put_in_place(partial: Path, out: Path, overwrite: bool) -> None:
-    """Rename a folder to `out`, and remove the old `out` if it may be replaced."""
+    """Rename a folder to `out`; an old `out` is removed if it may be replaced."""
     old = temporary_path(out, "replaced")
     try:
         _check_replaceable(out, overwrite, ())

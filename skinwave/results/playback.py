@@ -20,7 +20,7 @@ def phase_jump(tacton: Tacton, span: float) -> float:
 
 
 def whole_period(pressure: MovingPressure) -> float | None:
-    """Return the period in s of the whole pattern, or None if it has none within its duration."""
+    """Return the period in s of the whole pattern, or None if it exceeds the duration."""
     whole = pattern_period(pressure.tacton)
     turns = whole * max(repetition_frequencies(pressure.tacton).values(), default=0.0)
     return whole if turns and phase_jump(pressure.tacton, whole) <= SAME_PHASE * turns else None
@@ -32,8 +32,8 @@ def played_part(
     """Return the duration in s and the number of frames of an animation.
 
     The duration is the period of the whole pattern, or the time after which it nearly repeats. The
-    number of frames follows from the `fastest` strong line in Hz, unless it is given. If a pattern
-    needs more than `most` frames, only a part is played: the one with the smallest phase jump.
+    number of frames follows from the `fastest` strong line in Hz, unless given. If this exceeds
+    `most`, only a part is played: that with the smallest phase jump.
     """
     span, tacton = pattern_period(pressure.tacton), pressure.tacton
     needed = ceil(FRAMES_PER_PERIOD * fastest * span * (1 - SAME_PHASE))

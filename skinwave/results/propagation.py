@@ -31,7 +31,7 @@ FACTOR_OF_TWO = 20 * np.log10(2.0)  # dB: the uncertainty of a device's pressure
 @dataclass(frozen=True, kw_only=True)
 class Component:
     """A spectral line at the probe where it is strongest: frequency in Hz, amplitude in the unit of
-    the response, and sensation level in dB (None unless the body is skin).
+    the response, and sensation level in dB, or None if the body is not skin.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Component:
 
 @dataclass(frozen=True, kw_only=True)
 class Reach:
-    """A distance in m from the path; `beyond` if the map ends there."""
+    """A distance in m from the path; `beyond` if it extends past the map."""
 
     metre: float
     beyond: bool = False
@@ -58,10 +58,10 @@ class Propagation:
     column : str, the body, as `Run.column`
     strongest, kernel_strongest : components of largest amplitude
     highest_sensation : component of highest sensation level, None unless the body is skin
-    delay : float, s, of the strongest component behind the kernel's, at the probe next to the path
-        where both move, or None
+    delay : float, s, of the strongest component relative to the kernel, at the probe closest to the
+        path at which both move, or None
     share, spread, kernel_spread : from the maps, or None without maps
-    above_threshold : reach with half, once and twice the pressure, each None if nothing is above
+    above_threshold : reach with half, once and twice the pressure, each None if nothing exceeds the
         threshold; empty unless the body is skin and has a map
     """
 
@@ -82,8 +82,8 @@ def propagation(
     surface: SurfaceField | None = None,
     kernel_surface: SurfaceField | None = None,
 ) -> Propagation:
-    """Return the difference between a body's response and the point kernel's at the same probes,
-    and between their maps on one grid; raises a ValueError if their loads differ.
+    """Return the effect of propagation from responses of a body and of the point kernel at the same
+    probes, and from their maps on one grid. Raises a ValueError if their loads differ.
     """
     if run.scene.pressure != kernel.scene.pressure:
         raise ValueError(
@@ -111,14 +111,14 @@ def propagation(
 
 def share_outside(kernel: Floats, rms: Floats) -> float:
     """Return the share (0 to 1) of squared motion (ny, nx) where the kernel (ny, nx) is 20 dB below
-    its largest; nan is off the body.
+    its largest value. Places off the body are nan.
     """
     outside = kernel < _level(kernel, OUTSIDE)
     return float(np.nansum(rms[outside] ** 2) / np.nansum(rms**2))
 
 
 def reach_of(inside: np.ndarray, distance: Floats) -> Reach:
-    """Return the largest distance (ny, nx) in m of the places (ny, nx) that are `inside`."""
+    """Return the largest `distance` (ny, nx) in m among the places `inside` (ny, nx)."""
     edge = np.ones_like(inside)
     edge[1:-1, 1:-1] = False
     return Reach(metre=float(distance[inside].max()), beyond=bool((inside & edge).any()))
@@ -131,14 +131,14 @@ def distance_from_path(scene: Scene, places: Floats) -> Floats:
 
 def mach_angle(wave_speed: float, speed: float) -> float | None:
     """Return the Mach angle asin(c/v) in rad of a focus on a straight path, or None if the focus is
-    slower than the wave. On a circle smaller than a wavelength no clean cone forms.
+    slower than the wave. On a circle smaller than a wavelength there is no clear cone.
     """
     return asin(wave_speed / speed) if speed > wave_speed else None
 
 
 def strongest_component(run: Run, *, by_sensation: bool = False) -> Component | None:
-    """Return the line of largest amplitude at any probe or, `by_sensation`, of highest sensation
-    level, or None if nothing vibrates.
+    """Return the line of largest amplitude or, with `by_sensation`, of highest sensation level, at
+    any probe; None if nothing vibrates.
     """
     names = [name for name, f in run.frequencies.items() if f > 0]
     amplitudes = np.array([run.lines[name] for name in names])

@@ -22,7 +22,7 @@ REPORTING = ("command", "command_name", "out", "overwrite", "quiet", "json", "de
 
 
 def command_entry(options: Namespace) -> dict[str, Any]:
-    """Return a command as typed, with its name and options."""
+    """Return a record of a command: as typed, its name and its options."""
     given = {name: value for name, value in vars(options).items() if name not in REPORTING}
     return {
         "typed": shlex.join(["skinwave", *options.typed]),

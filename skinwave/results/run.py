@@ -36,7 +36,7 @@ class OfTacton:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run(OfTacton):
-    """Response of one model to one Tacton on one body; its lines are those of the load."""
+    """Response of one model to one Tacton on one body, with the lines of the load."""
 
     tacton: str
     body: str
@@ -65,7 +65,7 @@ class Run(OfTacton):
 
     @property
     def line_hz(self) -> dict[str, float]:
-        """Names and frequencies in Hz of the resolved lines of the load, each once."""
+        """Frequencies in Hz of the resolved lines of the load by name, each line once."""
         return self.table.frequencies
 
     @property
@@ -75,12 +75,12 @@ class Run(OfTacton):
 
     @cached_property
     def frequencies(self) -> dict[str, float]:
-        """Frequencies in Hz by name; lines that coincide have each name that claims are about."""
+        """Frequencies in Hz by name; coinciding lines have all names that claims use."""
         return {name: self.line_hz[own] for name, own in self._own.items()}
 
     @cached_property
     def lines(self) -> dict[str, Floats]:
-        """Amplitudes (p,) by the names of `frequencies`, in the unit of the response."""
+        """Amplitudes (p,) in the unit of the response, by the names of `frequencies`."""
         return {name: self.table.amplitudes[own] for name, own in self._own.items()}
 
     @cached_property

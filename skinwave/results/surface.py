@@ -64,12 +64,12 @@ class SurfaceField:
     Parameters
     ----------
     x, y : (nx,), (ny,) float, m, equally spaced
-    rms : (ny, nx) float, SI unit of the quantity; nan off the body
+    rms : (ny, nx) float, in the SI unit of the quantity; nan off the body
     quantity : Quantity; the pressure for the point kernel
-    level : (ny, nx) float, dB, highest sensation level of a component; nan off the body; None
-        unless the map is of the displacement of skin
+    level : (ny, nx) float, dB, highest sensation level of a component, nan off the body; None
+        unless the map shows the displacement of skin
     depth : float, m, below the surface
-    note : str, how it was computed
+    note : str, method of computation
     error : float, expected error relative to the largest RMS, or nan
     """
 
@@ -127,9 +127,9 @@ def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceField:
 def body_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions = DEFAULT) -> SurfaceField:
     """Return the map of a body's displacement at x (nx,) and y (ny,) in m, with sensation levels.
 
-    Elements are larger than those of `simulate`, or as large as the options say if that is larger.
-    A sheet is linear if the model of the options is.
-    Raises a ValueError if the body is missing or cannot be meshed.
+    Elements are larger than those of `simulate`, or have the size in the options if that is larger.
+    A sheet is linear if the model in the options is. Raises a ValueError if the body is missing or
+    cannot be meshed.
     """
     if options.h is None and takes(FROM_REST, scene):
         return _plate_map(scene, x, y, options.model)
@@ -142,7 +142,7 @@ def body_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions = DEFAULT
 
 
 def _plate_map(scene: Scene, x: Floats, y: Floats, model: str = "auto") -> SurfaceField:
-    """Return the map of a thin plate in its modes: linear if the model is, or if that is enough."""
+    """Return the map of a thin plate from its modes, linear if the model is or if that suffices."""
     places = _places(x, y)
     is_linear = model != "auto" and not named(model).is_nonlinear
     if is_linear or not beyond_linear(scene, MAP_TOLERANCE):
@@ -167,7 +167,8 @@ def quantity_map(
     Raises
     ------
     ValueError
-        If there is no body, there are too many places, or the quantity cannot be read there.
+        If there is no body, there are too many places, or the quantity cannot be read at this
+        depth.
     """
     if not scene.body.of_kind.discretise:
         raise ValueError("a map needs a body, and the scene has none. Give one under [body]")
@@ -277,8 +278,8 @@ def _field(
 
 
 def _interpolate(pressure: MovingPressure, lines_at: LinesAt, x: Floats, y: Floats) -> Lines:
-    """Return the lines on a grid. Those of an axisymmetric load are interpolated from a radius;
-    then only their amplitudes are valid.
+    """Return the lines on a grid. For an axisymmetric load they are interpolated along a radius;
+    only their amplitudes are then valid.
     """
     places = _places(x, y)
     if not _is_axisymmetric(pressure):
@@ -311,7 +312,7 @@ def _rms(quantity: Quantity, lines: Lines, places: int) -> Floats:
 
 
 def _invariant_rms(quantity: Quantity, f: Floats, a: fem.Complex) -> Iterator[Floats]:
-    """Yield the RMS (q,) of an invariant of components (f, p, c), some places at a time."""
+    """Yield the RMS (q,) of an invariant of components (f, p, c), a few places at a time."""
     times = TIME_STEP * np.arange(1.0, MANY_TIMES)
     window = np.sin(np.pi * np.arange(1, MANY_TIMES) / MANY_TIMES) ** 4
     window /= window.sum()

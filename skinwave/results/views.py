@@ -1,6 +1,6 @@
 """Views: the surface of one response through a period of its steady state, for pictures.
 
-Motion is about its mean, because a steady push bends a sheet far more than its vibration does.
+Motion is about its mean, because the mean pressure bends a sheet much more than the vibration.
 """
 
 import json
@@ -56,7 +56,7 @@ MotionAt = Callable[[Floats, Floats], Floats]  # places (q, 2), times (t,) -> (t
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """One model's response in a scene, as pictures need it.
+    """One model's response to a scene, with the data for pictures.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class View:
 
     @cached_property
     def upward(self) -> Ints:
-        """Triangles (k, 3) of the surface seen from above; some of a steep rim are not."""
+        """Triangles (k, 3) of the surface that face upwards; those of a steep rim may not."""
         corners = self.places[self.triangles]
         along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
@@ -156,14 +156,14 @@ def body_view(
 
 
 def with_shade(view: View, scene: Scene) -> View:
-    """Return a view coloured by the quantity of a scene's probes; raises what `shade` raises."""
+    """Return a view coloured by the quantity of a scene's probes; raises the errors of `shade`."""
     assert view.moved
     nodes = np.unique(boundary_facets(view.tets))
     return replace(view, shade=shade(scene, view.moved, view.times, nodes))
 
 
 def with_tensors(view: View) -> View:
-    """Return a view with strain and stress at `FIELD_FRAMES` of its times, if its body is solid."""
+    """Return a view with strain and stress at `FIELD_FRAMES` of its times if the body is solid."""
     if view.moved is None or view.scene.body.of_kind.is_plate:
         return view
     return replace(view, tensors=tensors(view.moved, view.times, field_frames(len(view.times))))
@@ -213,14 +213,14 @@ def _speed(scene: Scene, tone: float) -> float | None:
 
 
 def _strongest_tone(frequencies: Floats, amplitudes: Floats) -> float:
-    """Return the frequency in Hz of the line (f,) that moves points (f, p) most, or 0."""
+    """Return the frequency in Hz of the line (f,) with the largest motion (f, p), or 0."""
     if not len(frequencies):
         return 0.0
     return float(frequencies[np.argmax((amplitudes**2).sum(axis=1))])
 
 
 def _large_motion(scene: Scene, linear: LinesAt, middle: Floats) -> tuple[LinesAt, MotionAt]:
-    """Return lines and motion of a sheet at large deflection, in the later half of the scene."""
+    """Return lines and motion of a sheet at large deflection in the later half of the scene."""
     from scipy.interpolate import CubicSpline  # slow to import
 
     at, z, modes = steady_motion(scene, PLATE_TOLERANCE)

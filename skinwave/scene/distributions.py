@@ -41,10 +41,10 @@ class Distribution:
     Parameters
     ----------
     shape : "lognormal" (the value is the median), "normal", "uniform" or "triangular" (the mode)
-    measure : "spread", the standard deviation over the central value; "factor", so that 90 % of a
-        lognormal lie between value / factor and value * factor; "standard_error", the standard
-        deviation in the unit of the value; or "bounds"
-    width : one number of that measure, or low and high
+    measure : "spread", standard deviation over the central value; "factor": 90 % of a lognormal lie
+        between value / factor and value * factor; "standard_error", standard deviation in the unit
+        of the value; or "bounds"
+    width : one number in this measure, or low and high
 
     >>> Distribution(measure="factor", width=(2.0,)).quantile(50.0, [0.05, 0.5, 0.95]).round(6)
     array([ 25.,  50., 100.])
@@ -72,7 +72,7 @@ class Distribution:
 
     @property
     def is_relative(self) -> bool:
-        """Whether its width is relative to the value, and thus the same in any unit."""
+        """Whether its width is relative to the value, and so independent of the unit."""
         return self.measure in ("spread", "factor")
 
     @property
@@ -100,7 +100,7 @@ class Distribution:
         return np.asarray(value * np.exp(s * ndtri(shares)))
 
     def check(self, value: float) -> None:
-        """Refuse a central value that does not fit the distribution."""
+        """Raise a ValueError for a central value that does not fit the distribution."""
         if self.measure == "bounds" and not self.width[0] <= value <= self.width[1]:
             low, high = self.width
             raise ValueError(
@@ -129,7 +129,7 @@ class Distribution:
 @dataclass(frozen=True, kw_only=True)
 class Spread:
     """An uncertain number of a scene: its dotted `key`, its central `value` in the unit of the key,
-    its distribution, and whether a preset `implied` it.
+    its distribution, and whether it is `implied` by a preset.
     """
 
     key: str
@@ -139,7 +139,7 @@ class Spread:
 
     @property
     def part(self) -> str:
-        """The part of an uncertainty that it belongs to: material, device or placement."""
+        """The source of uncertainty that it belongs to: material, device or placement."""
         return PARTS.get(self.key.partition(".")[0], "placement")
 
     def at(self, shares: ArrayLike) -> list[float]:
@@ -153,7 +153,7 @@ def within_factor(factor: float) -> Distribution:
 
 
 def uniform(key: str, low: float, high: float) -> Spread:
-    """Return a number that is uniform between limits."""
+    """Return a number that is uniformly distributed between limits."""
     bounds = Distribution(shape="uniform", measure="bounds", width=(low, high))
     return Spread(key=key, value=(low + high) / 2, distribution=bounds)
 
@@ -207,9 +207,9 @@ CALL = re.compile(rf"\s*({'|'.join(CALLS)})\s*\(([^()]*)\)\s*")
 
 
 def parse_distribution(key: str, text: str) -> Spread | None:
-    """Return the spread of a key by a text such as those in `CALLS`; None for any other text.
+    """Return the spread of a key from a text like those in `CALLS`; None for any other text.
 
-    The central value comes first, or in the middle between limits.
+    The central value comes first, or is the middle of the limits.
     """
     match = CALL.fullmatch(text)
     if match is None:

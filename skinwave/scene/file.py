@@ -44,7 +44,7 @@ PATHS = "write a Windows path in single quotes, 'C:\\hand.stl', or with /, \"C:/
 def read(path: str | Path) -> Scene:
     """Read the scene in a TOML file.
 
-    Raises a ValueError, in one sentence, if the file cannot be read or is not a scene.
+    Raises a ValueError if the file cannot be read or is not a scene.
 
     >>> from pathlib import Path
     >>> _ = Path("scene.toml").write_text("[tacton]\\nam_frequency_hz = 140\\n")
@@ -63,7 +63,8 @@ def read(path: str | Path) -> Scene:
 
 
 def loads(text: str) -> Scene:
-    """Return the scene in a TOML text; missing keys take the values of the preset body.
+    """Return the scene in a TOML text; missing keys take the values of the preset body. Raises a
+    ValueError if it is not a scene.
 
     >>> scene = loads('[tacton]\\nshape = "circle"\\nsize_mm = 20\\nspeed_m_per_s = 12')
     >>> scene.tacton.trajectory.size, scene.body.kind
@@ -97,7 +98,7 @@ def _not_toml(text: str, error: str) -> str:
 
 
 def _check_texts(table: Mapping[str, Any]) -> None:
-    """Refuse control characters, which backslashes of a path in double quotes become."""
+    """Refuse control characters, which result from backslashes of a path in double quotes."""
     for key, value in table.items():
         for each in value if isinstance(value, list) else [value]:
             if isinstance(each, dict):
@@ -107,7 +108,7 @@ def _check_texts(table: Mapping[str, Any]) -> None:
 
 
 def from_table(table: dict[str, Any]) -> Scene:
-    """Return the scene of a table by the keys of a scene file."""
+    """Return the scene from a table with the keys of a scene file."""
     table, spreads = without_spreads(table)
     sections = {"name": as_text, **dict.fromkeys(SECTIONS, as_table)}
     preset, table = _preset(table)
@@ -131,7 +132,7 @@ def from_table(table: dict[str, Any]) -> Scene:
 
 
 def with_distributions(scene: Scene, spreads: Mapping[str, Distribution]) -> Scene:
-    """Return the scene with these distributions of its numbers by dotted key, and no others."""
+    """Return the scene with only these distributions of its numbers, by dotted key."""
     complete = to_table(scene)
     by_key = dict(_of_shear(complete, *each) for each in spreads.items())
     for key in by_key:
@@ -141,7 +142,7 @@ def with_distributions(scene: Scene, spreads: Mapping[str, Distribution]) -> Sce
 
 
 def _of_shear(complete: dict[str, Any], key: str, given: Distribution) -> tuple[str, Distribution]:
-    """The distribution of a shear modulus for that of a Young's modulus, at its Poisson's ratio."""
+    """The distribution of a shear modulus from that of a Young's modulus."""
     path, _, name = key.rpartition(".")
     shear = f"{path}.shear_modulus_pa"
     if name != "young_modulus_pa" or value_at(complete, shear) is None:
@@ -211,7 +212,7 @@ def to_table(scene: Scene) -> dict[str, Any]:
 
 
 def _unused_keys(scene: Scene) -> set[str]:
-    """Sections and dotted keys that do not apply to the scene's kind of load and base."""
+    """Sections and dotted keys that do not apply to the scene's load and base."""
     load = scene.load.of_kind
     own = SECTIONS["load"].items()
     has = {"kind", "gravity", *load.defaults}

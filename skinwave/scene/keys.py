@@ -1,6 +1,6 @@
-"""Keys of a scene file, each with its unit, its values and the attribute behind it.
+"""Keys of a scene file, each with its unit, its values and its attribute.
 
-Also reads and changes dotted keys in the table of a scene.
+The module also reads and changes dotted keys in the table of a scene.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -60,13 +60,13 @@ def _number(key: str, value: Any) -> float:
 
 
 def as_text(key: str, value: Any) -> str:
-    """Return a text, or raise a ValueError for another type."""
+    """Return a text; raise a ValueError for another type."""
     text: str = _of_type(key, value, str, "a text in quotes")
     return text
 
 
 def as_table(key: str, value: Any) -> dict[str, Any]:
-    """Return a table, or raise a ValueError for another type."""
+    """Return a table; raise a ValueError for another type."""
     table: dict[str, Any] = _of_type(key, value, dict, f"a table, [{key}]")
     return table
 
@@ -116,7 +116,7 @@ def _write_points(points: Points) -> list[list[float]]:
 def _record(
     section: str, name: str, make: Callable[..., Any], keys: Keys, required: int = 0
 ) -> SceneKey:
-    """Key of a table for a record; the first `required` keys of the table must be given."""
+    """Key of a table that makes a record; the first `required` keys of the table must be given."""
 
     def read(key: str, value: Any) -> Any:
         where = f"{section}.{key}"
@@ -204,7 +204,7 @@ def _regions(key: str, value: Any) -> tuple[tuple[str, str | Material], ...]:
 
 
 def _mounting(**values: Any) -> Mounting:
-    """With clips, edges are held only if they are named."""
+    """Mounting of a sheet; with clips, edges are supported only if they are named."""
     return Mounting(**({"edges": ()} if values.get("clips") else {}) | values)
 
 
@@ -241,7 +241,7 @@ def _scaled_number(name: str, per_unit: float = 1.0) -> SceneKey:
 
 
 def _in_units(value: float, per_unit: float) -> float:
-    """The shortest number for a file that is read back as the same value."""
+    """The shortest number that is read back from a file as the same value."""
     near = value * per_unit
     low, high = nextafter(near, -inf), nextafter(near, inf)
     nearest = [round(near, 9), round(near, 12), near, low, high]
@@ -274,13 +274,13 @@ def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:
 
 
 def _numbers_of(**keys: str) -> dict[str, SceneKey]:
-    """Number keys by the names of their attributes; the end of a key is its unit."""
+    """Number keys by attribute name; the end of a key is its unit."""
     units = {key: next((x for end, x in PER_SI.items() if key.endswith(end)), 1.0) for key in keys}
     return {key: _scaled_number(name, units[key]) for key, name in keys.items()}
 
 
 def _words_of(*names: str) -> dict[str, SceneKey]:
-    """Word keys with the names of their attributes."""
+    """Word keys by attribute name."""
     return {name: SceneKey(name, as_text, str) for name in names}
 
 
@@ -397,7 +397,7 @@ DERIVED = {"grammage_g_m2"}  # keys that set others, and that are not written
 
 
 def read_keys(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of a table by attribute name; an error suggests keys for an unknown one."""
+    """Return the values of a table by attribute name; errors suggest keys for unknown ones."""
     values = {}
     for key, value in table.items():
         if key not in keys:
@@ -427,7 +427,7 @@ def with_value(node: Any, path: Sequence[str], value: Any, complete: Any = None)
     """Return a copy of a table with another value at the end of a path.
 
     Missing tables on the path come from the `complete` table, and the name of a preset is replaced
-    by its table. Keys that the new one replaces are dropped.
+    by its table. Keys that the new key replaces are dropped.
     """
     if not path:
         return value

@@ -1,13 +1,13 @@
 """Load of a scene: a pressure, a shear traction, or the force of a contact.
 
-A Tacton defines q(x, t) at the surface. The kind of load defines the meaning of q and its direction
-on a surface of normal n. Static gravity may be added. The support, which is everything that clamps
-the body or carries its springs, may have one translation
+A Tacton defines q(x, t) at the surface. The kind of load defines the meaning of q, and its
+direction on a surface with normal n. Static gravity may be added. The support, which is everything
+that clamps the body or carries its springs, may move in one translation
 
     u_c(t) = direction amplitude sin(2 pi f t),   t >= 0
 
 With u = w + u_c everywhere, w is the motion relative to the support. A rigid translation causes no
-strain, so that A(s) w = -s^2 M u_c, the load of an inertial force.
+strain, so that A(s) w = -s^2 M u_c, an inertial force.
 """
 
 from __future__ import annotations
@@ -32,13 +32,15 @@ HIGHEST_FREQUENCY = 1000.0  # Hz, of a support: reduced bodies meet their tolera
 
 @dataclass(frozen=True, kw_only=True)
 class SupportMotion:
-    """Harmonic translation of a support, a sine from rest.
+    """Harmonic translation of a support: a sine that starts at t = 0.
 
     Parameters
     ----------
     amplitude : float, m, at most 0.01
     frequency : float, Hz, at most 1000
     direction : (x, y, z) of any length, z upwards
+
+    Raises a ValueError if a value is out of range.
     """
 
     amplitude: float
@@ -87,14 +89,14 @@ class Load:
     Parameters
     ----------
     kind : one of `LOADS`
-    direction : of a shear traction (x, y) of any length, or "path", along the path of the focus; of
-        a force (x, y, z), z upwards; () for the default of the kind
+    direction : of a shear traction (x, y) of any length, or "path" for that of the focus; of a
+        force (x, y, z), z upwards; () for the default of the kind
     force : float, N, of a contact at full drive
     width : float, m, standard deviation of the Gaussian traction of a contact; 0 for 2 mm
     gravity : float, m/s2, downwards; it deflects the body before the load begins
-    support_motion : SupportMotion of everything that holds the body, or None
+    support_motion : SupportMotion, or None
 
-    Raises a ValueError if a value is unknown, out of range, or does not apply to the kind.
+    Raises a ValueError if a value is unknown or out of range, or does not apply to the kind.
 
     >>> Load(kind="shear").words
     'a shear traction along (1, 0)'
@@ -124,7 +126,7 @@ class Load:
 
     @property
     def is_plain(self) -> bool:
-        """Whether it is only the pressure of the focus."""
+        """Whether it is the pressure of the focus alone."""
         return self == PRESSURE
 
     @property
@@ -151,16 +153,16 @@ class Load:
     def tractions(self, normals: Floats) -> Floats:
         """Return traction vectors (c, n, 3) of its components, per unit of each.
 
-        They act at points of a surface that faces the device, of unit normals (n, 3).
+        They act at points of a surface that faces the device, with unit normals (n, 3).
         """
         return self.of_kind.tractions(self, normals)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadKind:
-    """Kind of load: its `words`, the `defaults` of the attributes that it takes, and its `check`.
+    """Kind of load: its `words`, the `defaults` of its attributes, and its `check`.
 
-    `acting` returns the Tacton's pressure as the scalar load of this kind; `pressures` and
+    `acting` turns the Tacton's pressure into the scalar load of this kind; `pressures` and
     `tractions` are those of `Load`.
     """
 
@@ -210,7 +212,7 @@ def _shear_pressures(load: Load, pressure: MovingPressure) -> tuple[MovingPressu
 
 
 def _contact_pressure(load: Load, pressure: MovingPressure) -> MovingPressure:
-    """Traction of a contact, whose force is the commanded signal itself."""
+    """Traction of a contact, whose force follows the commanded signal."""
     return replace(
         pressure, profile=ContactSpot(width=load.width), drive="linear", height=NOMINAL_HEIGHT,
         depth_of_modulation=1.0, peak_pressure=load.force / (2 * pi * load.width**2),

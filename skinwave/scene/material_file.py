@@ -1,4 +1,4 @@
-"""Materials in scene files: values by attribute name, and the laws behind them."""
+"""Materials in scene files: values by attribute name, and laws."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -22,7 +22,7 @@ LEAST_POISSON = -0.999  # avoids a division by 0; the material checks Poisson's 
 
 
 def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Material:
-    """Return the material of values by attribute name; `where` and `keys` are for messages."""
+    """Return the material with values by attribute name; `where` and `keys` are for messages."""
     values = _by_shear(values, where, keys)
     _check_limits(values, where, keys)
     kind, needed, optional = _kind(values)
@@ -45,7 +45,7 @@ def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) 
 
 
 def _check_limits(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> None:
-    """Refuse numbers that no solid has in these units, and whose results would overflow."""
+    """Refuse numbers that no solid has in these units; results would overflow."""
     slowest = LONGEST * values.get("shear_modulus", inf)
     for name, (low, high) in {**LIMITS, "viscosity": (-inf, slowest)}.items():
         if isfinite(value := values.get(name, low)) and not low <= value <= high:
@@ -56,7 +56,7 @@ def _check_limits(values: Mapping[str, Any], where: str, keys: Mapping[str, str]
 
 
 def _by_shear(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Mapping[str, Any]:
-    """The same values with the shear modulus E / 2 (1 + nu) in place of Young's modulus E."""
+    """The values with the shear modulus E / 2 (1 + nu) in place of Young's modulus E."""
     if "young" not in values:
         return values
     rest = {name: value for name, value in values.items() if name != "young"}
@@ -75,7 +75,7 @@ def _by_shear(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) ->
 
 
 def _kind(values: Mapping[str, Any]) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
-    """Kind of a material in words, the attributes that it needs, and those that it may have."""
+    """Kind of a material in words, and its required and optional attributes."""
     if "table" in values:
         return "a table of complex moduli", TABULATED, ()
     if "law" in values:
@@ -134,7 +134,7 @@ def _materials(scene: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def modulus_columns(table: ModulusTable) -> dict[str, list[float]]:
-    """Return the columns of a table of complex moduli, by their keys."""
+    """Return the columns of a table of complex moduli by key."""
     moduli = table.moduli
     columns = (table.frequencies, [mu.real for mu in moduli], [mu.imag for mu in moduli])
     return {key: list(column) for key, column in zip(COLUMNS, columns, strict=True)}

@@ -23,8 +23,8 @@ def tactons() -> Iterator[tuple[str, Tacton]]:
 
 
 def scenes(name: str, tacton: Tacton, bodies: Mapping[str, Body] | None = None) -> dict[str, Scene]:
-    """Return scenes of one Tacton by both point kernels and on bodies by name, all with the same
-    load.
+    """Return scenes of one Tacton: by both point kernels and, under the same load, on bodies by
+    name.
 
     The default bodies are the paper sheet and skin.
     """
@@ -34,7 +34,7 @@ def scenes(name: str, tacton: Tacton, bodies: Mapping[str, Body] | None = None) 
 
 
 def beside_kernels(scene: Scene) -> dict[str, Scene]:
-    """Return the scene without its body, under the published load and under its own load."""
+    """Return the scene without its body, under the published load and under its own."""
     bare = with_body(scene, BODIES["none"])
     paper = replace(bare, pressure=published_load(scene.pressure))
     return {"point-kernel-published": paper, "point-kernel": bare}

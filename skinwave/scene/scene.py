@@ -46,7 +46,7 @@ PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Name of the quantity that probes read, and the depth in m of each; () at the surface."""
+    """Name of the quantity that probes read, and their depths in m; () at the surface."""
 
     quantity: str = DISPLACEMENT.name
     depths: tuple[float, ...] = ()
@@ -85,17 +85,17 @@ class Scene:
     Parameters
     ----------
     name : str
-    pressure : MovingPressure with its Tacton; for a load without a device, that of the load
+    pressure : MovingPressure, with the Tacton; for a load without a device, that of the load
     body : Body
-    probes : (p, 2) positions in m on the surface
-    depth : of the probes in m below the surface, along its normal; one for all, or one each
-    load : kind of load, and gravity
-    quantity : what the probes read, one of `simple_model.quantities.QUANTITIES`
-    spreads : dotted key of a scene file and distribution of its number about the value of the
-        scene. `scene.spreads` also has those of presets and of the device.
+    probes : (p, 2) float, m, positions on the surface
+    depth : float or (p,) float, m, of the probes below the surface, along its normal
+    load : Load, its kind and gravity
+    quantity : str, what probes read, a name in `simple_model.quantities.QUANTITIES`
+    spreads : (dotted key of a scene file, Distribution about the scene's value) of uncertain
+        numbers. `skinwave.scene.spreads` adds those of presets and of the device.
 
-    Raises a ValueError if a probe or the path of the focus lies outside the body, there is no
-    probe, or the body does not have the quantity or depth.
+    Raises a ValueError if a probe or the path of the focus lies outside the body, if there is no
+    probe, or if the body does not have the quantity or depth.
 
     >>> from simple_model import MovingPressure, Tacton
     >>> scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=BODIES["palm"])
@@ -217,7 +217,7 @@ class Scene:
 
 
 def _check_reading(body: Body, reading: Reading) -> None:
-    """Refuse a quantity or depth that a body does not have."""
+    """Raise a ValueError for a quantity or depth that a body does not have."""
     quantity, is_plate = reading.record, body.of_kind.is_plate
     deepest = max(reading.depths, default=0.0)
     if not quantity.of_body:
@@ -243,7 +243,7 @@ def _check_reading(body: Body, reading: Reading) -> None:
 
 
 def check_motion(scene: Scene, command: str) -> None:
-    """Refuse a scene for a command that needs the surface displacement under a pressure."""
+    """Raise a ValueError if a command needs the surface displacement under a pressure."""
     check_load(scene, command)
     if not scene.reading.is_plain:
         raise ValueError(
@@ -253,7 +253,7 @@ def check_motion(scene: Scene, command: str) -> None:
 
 
 def check_load(scene: Scene, command: str) -> None:
-    """Refuse a scene for a command that needs the pressure of a focus."""
+    """Raise a ValueError if a command needs the pressure of a focus."""
     if not scene.load.is_plain:
         raise ValueError(
             f"{command} needs the pressure of a focus, not {scene.load.words}; remove [load], or "

@@ -55,9 +55,9 @@ Variation = Choice | Spread
 
 @dataclass(frozen=True, kw_only=True)
 class DesignPoint:
-    """One run of a sweep: its `varied` keys and the scene, or the `error` why there is none.
+    """One run of a sweep: its `varied` keys and the scene, or an `error` instead.
 
-    `keys` and `text` are those of the scene's file. `before` is the scene before factors on all
+    `keys` and `text` are those of the scene's file. `before` is the scene without factors on all
     moduli or losses of a material.
     """
 
@@ -80,7 +80,7 @@ class DesignPoint:
 def parse(text: str) -> Variation:
     """Return the variation of `key=v1,v2`, `key=start:stop:n`, or a distribution.
 
-    A distribution is `key=start:stop`, uniform between limits, or `key=normal(25e3,0.3)` and so on.
+    A distribution is `key=start:stop`, uniform between limits, or like `key=normal(25e3,0.3)`.
     """
     key, equals, right = text.partition("=")
     key = _checked_key(key.strip())
@@ -110,9 +110,8 @@ def combinations(
     """Return the values of each run, by key.
 
     The design is "factorial", every value with every other; "zip", first with first; "lhs", a Latin
-    hypercube of samples of lists and distributions, the same for the same seed (McKay et al.,
-    Technometrics 21:239 (1979)); or "sobol", for Sobol' indices, with so many samples of each
-    matrix.
+    hypercube of lists and distributions, reproducible by the seed (McKay et al., Technometrics
+    21:239 (1979)); or "sobol", for Sobol' indices, with `samples` rows in each matrix.
     """
     choose("design", design, DESIGNS)
     keys = [variation.key for variation in variations]
@@ -156,9 +155,9 @@ def _shares(d: int, design: str, samples: int, seed: int) -> Floats:
 def saltelli_shares(d: int, n: int, seed: int = 0) -> Floats:
     """Return shares (n (d + 2), d) from 0 to 1 of d numbers, for Sobol' indices.
 
-    These are matrices A and B of n rows, a power of two, then A with column k of B for each k. They
-    come from a scrambled Sobol' sequence in 2 d dimensions (Owen, J Complex 14:466 (1998); Saltelli
-    et al., Comput Phys Commun 181:259 (2010), section 3).
+    These are matrices A and B of n rows, a power of two, then A with column k from B, for each k,
+    of a scrambled Sobol' sequence in 2 d dimensions (Owen, J Complex 14:466 (1998); Saltelli et
+    al., Comput Phys Commun 181:259 (2010), section 3).
     """
     from scipy.stats import qmc
 
@@ -173,7 +172,7 @@ def saltelli_shares(d: int, n: int, seed: int = 0) -> Floats:
 
 
 def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
-    """Return the runs of a scene file with each combination of values, or their errors."""
+    """Return the runs of a scene file for each combination of values, or their errors."""
     base = read(path)
     table = parse_toml(reading.read_text(path), path.parent)
     if base.body.file:
@@ -189,7 +188,7 @@ def cases_of(table: Any, complete: Any, combined: Sequence[Mapping[str, Any]]) -
 
 
 def with_values(scene: Scene, values: Mapping[str, Any]) -> Scene:
-    """Return a scene with other values of keys of its file; these keys have no spread.
+    """Return a scene with other values of keys of its file; these keys then have no spread.
 
     Keys such as "body.material.modulus_scale" are factors on all moduli or losses of a material.
     """
@@ -211,7 +210,7 @@ def _split_scales(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, 
 
 
 def _scale(scene: Scene, scales: Mapping[str, Any]) -> Scene:
-    """The scene with factors on all moduli or losses, those of one material at once."""
+    """The scene with all moduli or losses multiplied by factors, one material at a time."""
     places: dict[str, dict[str, float]] = {}
     for key, factor in scales.items():
         if isinstance(factor, bool) or not isinstance(factor, int | float) or not factor > 0:
@@ -256,7 +255,7 @@ def _checked_key(key: str) -> str:
 
 
 def _values(text: str) -> list[Any]:
-    """Values between commas, as in a scene file, or words without quotes."""
+    """Values separated by commas, as in a scene file, or words without quotes."""
     try:
         return list(tomllib.loads(f"values = [{text}]")["values"])
     except (tomllib.TOMLDecodeError, RecursionError):
@@ -285,7 +284,7 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
 
 
 def _change(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
-    """A copy of a table with other values, first that of the body, then those in it."""
+    """A copy of a table with other values: first of the body, then of keys in it."""
     for key in sorted(varied, key=lambda key: key != BODY):
         if key == BODY:
             table = table | {BODY: _body(varied[key])}
@@ -307,7 +306,7 @@ def _body(name: Any) -> Any:
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, float | str]:
-    """Keys with their section, and values that fit in a table cell."""
+    """Keys with their section, and values for cells of a table."""
     return {
         f"{section}.{key}": _plain(value)
         for section, values in table.items()
@@ -323,7 +322,7 @@ def _plain(value: Any) -> float | str:
 
 
 def _check_words(points: Sequence[DesignPoint]) -> None:
-    """Refuse words that no run can use. Numbers may be out of range in some runs."""
+    """Refuse words that are not valid in any run. Numbers may be out of range in some runs."""
     if all(case.error for case in points):
         raise ValueError(f"no combination gives a valid scene: {points[0].error}")
     accepted = {(k, str(v)) for case in points if not case.error for k, v in case.varied.items()}

@@ -1,4 +1,4 @@
-"""Albums: a scene's responses by all models that pictures show, in a folder.
+"""Albums: a scene's responses by all models for pictures, in a folder.
 
 scene.toml  plan.json  lines.csv
 COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz  map.npz
@@ -86,9 +86,9 @@ class Album:
 def scene_columns(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
     """Return a scene by `Run.column`: by both point kernels, on its own body and on other presets.
 
-    A scene without a body is shown on those of paper sheet and skin slab on which its path and
-    probes fit. All but the published kernel receive the same load. Raises a ValueError if the load
-    is not a pressure, or a body of `beside` is unknown or does not fit.
+    A scene without a body is computed on the paper sheet and the skin slab, if its path and probes
+    fit. All but the published kernel receive the same load. Raises a ValueError if the load is not
+    a pressure, or if a body in `beside` is unknown or does not fit.
     """
     check_load(scene, "a comparison with the point kernel")
     bodies: dict[str, Scene] = {}
@@ -111,7 +111,7 @@ def write_album(
     folder: Path, scene: Scene, options: SolveOptions, *, frames: int | None = None,
     beside: Sequence[str] = (),
 ) -> list[str]:  # fmt: skip
-    """Compute a scene by every model, fill a folder with the results, and return the warnings.
+    """Compute a scene by every model, write the results into a folder, and return the warnings.
 
     Raises a ValueError if a model cannot compute the scene.
     """
@@ -145,7 +145,7 @@ def compute_views(
 ) -> Iterator[tuple[View | None, Run, Plan | None]]:
     """Yield view, run and plan of each of `scene_columns`; the published kernel has no view.
 
-    Views use larger elements than responses, or the modes of a plate.
+    Views use larger elements than responses, or modes of a plate.
     """
     columns, progress = scene_columns(scene, beside), options.progress
     solving = replace(options, tolerance=PLANNED)
@@ -187,8 +187,9 @@ def compute_views(
 def _has_elements(scene: Scene, h: float | None) -> bool:
     """Whether pictures are drawn by finite elements.
 
-    Without a given element size, plates are drawn by their modes, and layers that cannot be meshed
-    by their wavenumber integral. Raises a ValueError if a body must be meshed and cannot be.
+    Without a given element size, plates are drawn from their modes, and layers that cannot be
+    meshed from their wavenumber integral. Raises a ValueError if a body must be meshed but cannot
+    be.
     """
     if not scene.body.of_kind.discretise:
         return False
@@ -208,7 +209,7 @@ def quantity_views(
 ) -> tuple[list[View], list[str]]:
     """Return views of a scene coloured by the probes' quantity, and warnings.
 
-    Only displacement includes the point kernel. Raises what `write_album` raises.
+    The point kernel is included only for displacement. Raises the errors of `write_album`.
     """
     computed = [
         (view, run)
@@ -232,7 +233,8 @@ def _misfit(run: Run, moved: BodyMotion) -> float:
 
 
 def open_album(folder: Path) -> Album:
-    """Read the results in a folder that `run`, `compare` or `report` wrote; no model is run.
+    """Read the results in a folder written by `run`, `compare` or `report`, without any
+    computation.
 
     Raises a ValueError if the folder has no results.
     """
@@ -290,7 +292,7 @@ def _read_run(path: Path) -> Run:
 
 
 def _read_json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the contents of a file that fit a pattern, or None if there is no file."""
+    """Return the contents of a file, checked against a pattern, or None without a file."""
     if not path.exists():
         return None
     content: dict[str, Any] = fitting(reading.load_json(path), pattern, str(path))
@@ -298,7 +300,7 @@ def _read_json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def select_columns(album: Album, columns: Sequence[str]) -> Album:
-    """Return an album with these columns, such as "point-kernel", or with all if none is given.
+    """Return an album with some columns, such as "point-kernel", or with all if none is given.
 
     Raises a ValueError if a column is unknown.
     """

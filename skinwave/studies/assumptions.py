@@ -53,7 +53,7 @@ LAYERS = (
 
 
 def droppable(scene: Scene) -> tuple[str, ...]:
-    """Return the assumptions that can be dropped, in the order of the model hierarchy.
+    """Return the assumptions that can be dropped for a scene, in the order of the hierarchy.
 
     Raises a ValueError if the scene has no body.
     """
@@ -82,8 +82,8 @@ def droppable(scene: Scene) -> tuple[str, ...]:
 def side_step(scene: Scene) -> tuple[str, ...]:
     """Return the assumptions dropped in a side step with a second damping law, or ().
 
-    With that law fast waves lose little, and finite elements take many times as long. Unless the
-    scene has the law, only the wavenumber integral is computed with it.
+    With this law fast waves lose little energy, and finite elements take many times as long. Only
+    the wavenumber integral is therefore computed with it, unless it is the law of the scene.
     """
     names = droppable(scene)
     if "viscous loss" in names or not scene.body.of_kind.is_layer or not scene.body.solid.viscosity:
@@ -211,7 +211,7 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
 
 
 def isotropic_sheet(body: Body) -> Body:
-    """Return a flat sheet with the mean stiffness and tension of its directions."""
+    """Return a flat sheet with stiffness and tension averaged over its directions."""
     mounting, tension = body.mounting, body.mounting.mean_tension
     mean = replace(mounting, tension_x=tension, tension_y=tension, curl_x=0.0, curl_y=0.0)
     if body.solid.orthotropy is None:
@@ -220,7 +220,7 @@ def isotropic_sheet(body: Body) -> Body:
 
 
 def merged_layer(layers: Sequence[Layer]) -> Layer:
-    """Return one layer with the total thickness and mean stiffness of several."""
+    """Return one layer with the total thickness and the mean stiffness of several layers."""
     thickness = sum(layer.thickness for layer in layers)
     solids = [solid_of(layer.material).relaxing() for layer in layers]
 
@@ -285,7 +285,7 @@ def as_viscous(solid: Material, w: float) -> Material:
 
 
 def strongest_line(scene: Scene) -> float:
-    """Return the line in Hz that moves the probes most, or 0; damping laws are matched there."""
+    """Return the line in Hz that moves the probes most, or 0; damping laws agree there."""
     frequencies, shares = response_spectrum(scene, 0.05)
     moving = frequencies > 0
     if not moving.any():

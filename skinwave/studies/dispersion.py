@@ -1,4 +1,4 @@
-"""Waves that a scene's body guides, and the modes that the lines of its load drive.
+"""Waves in a scene's body, and the modes that the lines of its load drive.
 
 Outside the focal spot, a line of the load moves the surface by the sum of all modes at its
 frequency. The driven mode is the one that moves the surface most at the edge of the main lobe of a
@@ -63,8 +63,8 @@ EXPLAINED = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrivenLine:
-    """A line of a load, its frequency in Hz and largest amplitude in Pa on the path, the mode that
-    it drives with the index of the frequency, and the share of the mode in the motion.
+    """A line of a load: its frequency in Hz, its largest amplitude in Pa on the path, the mode that
+    it drives, the index of the frequency, and the share of the mode in the motion.
     """
 
     name: str
@@ -166,7 +166,7 @@ def driven_modes(
 def _amplitudes(modes: Sequence[Mode], pressure: MovingPressure) -> np.ndarray:
     """Return the motion (m, f) in m/Pa of each mode at the edge of the main lobe.
 
-    It is 0 for a mode that decays so fast that the spot itself moves the surface more there.
+    It is 0 for a mode that decays so fast that the spot itself causes more motion there.
     """
     width, edge = spot_width(pressure.height), lobe_width(pressure.height)
     radiated = [np.abs(mode.wavenumbers.imag) * width**2 < edge for mode in modes]

@@ -38,8 +38,8 @@ Maps = tuple[SurfaceField, SurfaceField] | tuple[()]  # of a body and of the ker
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FirstScreen:
     """Results of one Tacton on the first screen of a page: runs of the kernel under the same load
-    and as published, and of bodies; effects and maps by column. If known, least and largest share
-    outside over the range of materials, error budget of `body`, and measured places.
+    and as published, and of bodies; effects and maps by column. If known: smallest and largest
+    share outside over the range of materials, error budget of `body`, and measured places.
     """
 
     kernel: Run
@@ -53,7 +53,7 @@ class FirstScreen:
 
     @property
     def body(self) -> Run:
-        """The body that the verdict describes: skin if present."""
+        """The body of the verdict: skin, if present."""
         skin = [run for run in self.bodies if run.scene.body.is_skin]
         return (skin or list(self.bodies))[-1]
 
@@ -133,8 +133,8 @@ def _run_of(group: Sequence[Run], model: str) -> Run | None:
 
 
 def _shares(scene: Scene) -> tuple[float, float] | None:
-    """Return the least and largest share outside the kernel's region over the range of moduli and
-    of losses of all materials, or None if none is uncertain.
+    """Return the smallest and largest share outside the kernel's region over the range of moduli
+    and losses of all materials, or None if none is uncertain.
     """
     spreads = [each for each in spreads_of(scene) if each.part == MATERIAL]
     if not spreads or not has_wavenumber_integral(scene):

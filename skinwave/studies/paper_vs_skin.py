@@ -47,8 +47,8 @@ LOADS: Mapping[str, Callable[[Floats], Floats]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """Levels in dB re the strongest line of a run by (Tacton, line) and mechanism, ratios of 2 f_AM
-    to f_AM at `AMPLITUDES` by mechanism, and a sentence for each failed run.
+    """Levels in dB re the strongest line of a run, by (Tacton, line) and mechanism; ratios of 2
+    f_AM to f_AM at `AMPLITUDES`, by mechanism; and a sentence for each failed run.
     """
 
     levels: Mapping[tuple[str, str], Mapping[str, float]]
@@ -93,7 +93,7 @@ Settled = Callable[[Tacton], tuple[MovingPressure, Response]]
 
 
 def _mechanisms(body: Body, h: float | None, progress: Progress) -> Mapping[str, Settled]:
-    """Return by mechanism a function that computes a Tacton's settled response."""
+    """Return, for each mechanism, a function that computes a Tacton's settled response."""
 
     def by(solve: Callable[[Scene], Response], drive: str) -> Settled:
         return partial(_steady_half, solve, body, drive)
@@ -126,7 +126,7 @@ def _steady_half(
 def _levels(pressure: MovingPressure, later: Response) -> dict[str, float]:
     """Return lines in dB re the strongest, at the probe where each is strongest.
 
-    They include the lines that claims are about: a stretching sheet has lines that no load has.
+    They include the lines of claims, because a stretching sheet has lines that its load does not.
     """
     names, _ = resolved_lines(pressure, later, candidates=ASSESSED, highest=HIGHEST)
     amplitudes = lines(later, list(names.values())).max(axis=1)
@@ -141,7 +141,7 @@ def _ratio(later: Response) -> float:
 
 
 def load_ratios() -> dict[str, tuple[float, ...]]:
-    """Return the amplitudes at 2f, 3f and 4f over that at f of each of `LOADS`."""
+    """Return the amplitudes at 2f, 3f and 4f relative to that at f, for each of `LOADS`."""
     m = np.sin(2 * np.pi * (np.arange(4096) + 0.5) / 4096)
     spectra = {name: np.abs(np.fft.rfft(load(m))) for name, load in LOADS.items()}
     return {name: tuple((a[2:5] / a[1]).tolist()) for name, a in spectra.items()}

@@ -1,9 +1,9 @@
 """Model hierarchy from the paper's model to the richest one: effect and cost of each assumption.
 
 Each step of the hierarchy drops one more assumption; leave-one-out models drop all but one. Each
-model runs in its own process, which gives its memory. Two run at once, of which at most one reduces
-a body. A body that several steps share is meshed and reduced once; its seconds and memory count in
-all of them.
+model runs in a process of its own, which measures its memory. At most two run at once, of which one
+may reduce a body. A body shared by several steps is meshed and reduced once; its seconds and memory
+count in all of them.
 """
 
 import os
@@ -97,8 +97,8 @@ class HierarchyStep:
 @dataclass(frozen=True, kw_only=True)
 class Effect:
     """Effect of dropping one assumption: largest change of a waveform relative to the strongest
-    probe, its probe (x, y) in m, increase of the sensation level and of lines in dB, change of the
-    waveform if this is the only assumption, and additional seconds.
+    probe, its probe (x, y) in m, increase of sensation level and lines in dB, change of the
+    waveform if only this assumption is made, and additional seconds.
     """
 
     name: str
@@ -113,7 +113,7 @@ class Effect:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hierarchy:
     """Model hierarchy: steps from the published to the richest model, side steps, which drop one
-    more assumption than the step they branch off, and leave-one-out models.
+    more assumption than the step where they branch off, and leave-one-out models.
     """
 
     scene: Scene
@@ -218,7 +218,7 @@ def _time(
 ) -> tuple[Response, float, int]:
     """Return a response, its seconds and the peak memory of its process.
 
-    With `coarse_first`, a body that cannot be reduced is refused on coarse elements.
+    With `coarse_first`, coarse elements are reduced first, to refuse a body at little cost.
     """
     os.environ["SKINWAVE_CACHE"] = cache
     if coarse_first and h:
@@ -242,7 +242,7 @@ def _compute(
 ) -> HierarchyStep:
     """Return a step with its response or its error.
 
-    Seconds and memory include what an earlier step spent on the same body.
+    Seconds and memory include those of an earlier step for the same body.
     """
     try:
         response, seconds, memory = future.result()
@@ -261,7 +261,7 @@ def _effect(
     scene: Scene, before: HierarchyStep, after: HierarchyStep, alone: Response | None,
     richest: Response,
 ) -> Effect:  # fmt: skip
-    """Return the effect of a step's assumption; only this one is made in `alone`."""
+    """Return the effect of a step's assumption, the only one in `alone`."""
     assert before.response
     assert after.response
     changes, scale = _changes(after.response, before.response)
@@ -297,7 +297,7 @@ def _level(scene: Scene, response: Response) -> float:
 def compared_lines(scene: Scene, response: Response) -> dict[str, float]:
     """Return the frequencies in Hz of resolved lines by name.
 
-    They are those of a nonlinear drive, which include all lines of a linear one.
+    These are the lines of a nonlinear drive, which include all lines of a linear one.
     """
     drive = usual_drive(scene.pressure.drive, MovingPressure.drive)
     pressure = replace(scene.pressure, drive=drive)
@@ -397,7 +397,7 @@ def _step_row(step: HierarchyStep) -> list[object]:
 
 
 def _line_rows(hierarchy: Hierarchy) -> Iterator[list[object]]:
-    """Yield the change of every line at each probe, from the step before and from the richest."""
+    """Yield the change of every line at each probe, from the previous and the richest step."""
     richest = [r.response for r in hierarchy.steps if r.response][-1]
     for before, step in hierarchy.pairs():
         assert before.response

@@ -146,7 +146,7 @@ def _spatial_parts(
 
 
 def _film(own: View, views: Sequence[View], style: Style, progress: Progress) -> Picture:
-    """Return the film, as WebP on the page if possible, which has a third of the bytes of GIF."""
+    """Return the film, on the page as WebP if possible, a third of the size of GIF."""
     count = len(own.times)
     slower = significant(duration(count) / own.period, 2)
     caption = f"Film: {played_text(own)}. {count} frames, slowed down {slower} times."
@@ -176,7 +176,7 @@ def map_parts(album: Album, gallery: Gallery) -> list[Part]:
 
 
 def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
-    """Return runs of one Tacton with both point kernels, which are computed again."""
+    """Return the runs of one Tacton and of both point kernels, which are computed again."""
     bodies = [run for run in runs if run.is_motion]
     return [*with_kernels(bodies[0])[:2], *bodies] if bodies else runs
 
@@ -240,7 +240,7 @@ def _command(results: Path) -> str:
 
 
 def map_sentences(scene: Scene, field: SurfaceField) -> list[str]:
-    """Return sentences on the largest value of a map, its place, its spread and its error."""
+    """Return sentences on a map: largest value, its place, spread and error."""
     if not np.nanmax(field.rms):
         return ["Nothing vibrates, because the load is constant."]
     row, column = np.unravel_index(np.nanargmax(field.rms), field.rms.shape)

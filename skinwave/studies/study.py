@@ -53,7 +53,7 @@ Scenes = Mapping[str, Mapping[str, Scene]]  # Tacton -> column -> scene
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOutcome:
-    """Outcome of a comparison; `runs` of the `planned` ones were done."""
+    """Outcome of a comparison: number of finished and of `planned` runs."""
 
     assessed_claims: list[AssessedClaim]
     warnings: list[str]
@@ -64,14 +64,14 @@ class StudyOutcome:
 
 
 def paper_scenes(bodies: Mapping[str, Body] | None = None) -> Scenes:
-    """Return the scenes of the paper's 15 Tactons by both point kernels and on bodies by name,
-    paper and skin if none is given.
+    """Return the scenes of the paper's 15 Tactons, by both point kernels and on bodies by name, by
+    default paper and skin.
     """
     return {name: paper15.scenes(name, tacton, bodies) for name, tacton in paper15.tactons()}
 
 
 def own_scenes(scene: Scene, name: str) -> Scenes:
-    """Return the scenes that a scene is compared in; raises a ValueError if no body fits."""
+    """Return the scenes in which a scene is compared; raises a ValueError if no body fits."""
     columns = scene_columns(scene)
     if not any(each.body.of_kind.discretise for each in columns.values()):
         raise ValueError(
@@ -91,12 +91,12 @@ def run_study(
     measured: Measured | None = None,
     more: Sequence[document.Part] = (),
 ) -> StudyOutcome:
-    """Run every scene and write each run when it is finished, then the tables and the page.
+    """Run every scene, write each run when it is finished, then write tables and page.
 
-    Each body has one model: the given one, or the most complete of those that plans choose for its
-    scenes, or finite elements if their size is given. A measurement is compared with the models of
-    its Tacton. `more` are further parts of the page. An interrupt ends the runs early; finished
-    runs are still compared and written.
+    Each body has one model: the given one, finite elements if their size is given, or the most
+    complete one that plans choose for its scenes. A measurement is compared with the models of its
+    Tacton. `more` are further parts of the page. After an interrupt, finished runs are compared and
+    written.
     """
     models = _models(scenes, options)
     started, planned, progress = (
@@ -191,7 +191,7 @@ def _runs(
     """Yield every run, those of fast models first.
 
     Bodies are reduced here, once for all Tactons, into `prepared`. Workers compute the coarser
-    bodies, from which errors follow, and all other responses.
+    bodies, for the errors, and all other responses.
     """
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
     reduced = {column for column, model in models.items() if named(model).is_reduced}

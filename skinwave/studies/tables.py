@@ -69,7 +69,7 @@ def _share(run: Run, name: str, probe: int) -> float:
 
 
 def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> list[str]:
-    """Return a line's amplitude (0 if it is round-off) and, for skin, its level over threshold."""
+    """Return a line's amplitude, 0 if round-off, and for skin its level above threshold."""
     if _share(run, name, probe) < NEGLIGIBLE_LINE_RATIO:
         return ["0", ""] if run.is_skin else ["0"]
     size = significant(run.response.record.per_unit * float(run.table.amplitudes[name][probe]))
@@ -96,7 +96,7 @@ def _unnamed_rows(runs: Sequence[Run], probe: int) -> Iterator[list[object]]:
 
 
 def claims_parts(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
-    """Return a table of which claims hold where, and the deciding numbers."""
+    """Return a table of claims: where they hold, and the deciding numbers."""
     if not assessed_claims:
         return []
     columns = list(dict.fromkeys(v.column for v in assessed_claims))
@@ -148,7 +148,7 @@ def _disagreements(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
 
 
 def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Table:
-    """Return a table that compares pairs of responses between which one thing changes.
+    """Return a table that compares pairs of responses that differ in one respect.
 
     Drive law and focus change between the two kernels, propagation between kernel and body.
     """
@@ -161,7 +161,7 @@ def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Table:
 
 
 def _pairs(group: Iterable[Run]) -> list[tuple[str, Run, Run]]:
-    """Return the names of changes, and the two runs between which each is made."""
+    """Return names of changes, each with the two runs before and after it."""
     runs = {run.column: run for run in group}
     kernel, published = runs.get(SAME_LOAD.name), runs.get(PUBLISHED.name)
     if kernel is None:

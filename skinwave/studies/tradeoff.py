@@ -68,7 +68,7 @@ class Candidate:
 @dataclass(frozen=True, kw_only=True)
 class Result:
     """Relative error of a candidate at the worst probe, seconds `cold` and `warm`, peak memory in
-    bytes and degrees of freedom.
+    bytes, and degrees of freedom.
     """
 
     candidate: Candidate
@@ -79,14 +79,14 @@ class Result:
     dofs: int
 
     def beats(self, other: "Result") -> bool:
-        """Whether it is as accurate and as fast, cold and warm, and better in one of these."""
+        """Whether it is as accurate and fast, cold and warm, and better in one of these."""
         own, others = ((m.error, m.cold, m.warm) for m in (self, other))
         return own != others and all(a <= b for a, b in zip(own, others, strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Results of all candidates by cold time, and the self-convergence of the reference."""
+    """Results of all candidates by cold time, and self-convergence of the reference."""
 
     results: tuple[Result, ...]
     reference: Candidate
@@ -102,7 +102,7 @@ class Study:
         return [m for m in self.results if not any(o.beats(m) for o in self.results)]
 
     def cheapest(self, bar: float) -> Result | None:
-        """Return the cheapest candidate within an error, or None."""
+        """Return the result of the fastest candidate with an error of `bar` at most, or None."""
         return next((m for m in self.results if m.error <= bar), None)
 
 
@@ -126,7 +126,7 @@ def candidates(scene: Scene) -> list[Candidate]:
 
 
 def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None = None) -> Study:
-    """Measure candidates on a scene, each in its own process, which gives its memory.
+    """Measure candidates on a scene, each in a process of its own, which measures its memory.
 
     Raises a ValueError if the scene has no body, or a load other than a pressure.
     """

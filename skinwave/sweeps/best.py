@@ -2,8 +2,8 @@
 under the spreads of the scene.
 
 The best point of a grid and its neighbours define a parabola, and a run at its vertex refines the
-best value. Each sample of the spreads has its own best value, found in the same way. The interval
-contains 95 % of them, and is wider at each end by a tenth of a grid step, their accuracy.
+best value. Each sample of the spreads has a best value of its own, computed in the same way. The
+interval contains 95 % of them, extended at each end by their accuracy, a tenth of a grid step.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,11 +36,11 @@ class Best:
 
     Parameters
     ----------
-    key, column : str, the varied key, and the column of the table that is largest
-    value, result : float, the best value, and the column there
-    limits : least and largest value of the grid
-    interval : 95 % interval of the best values of the samples; None if no uncertain number of the
-        scene affects the column
+    key, column : str, the varied key, and the column of the table to be maximised
+    value, result : float, the best value, and the value of the column there
+    limits : lowest and highest value of the grid
+    interval : 95 % interval of the samples' best values; None if no uncertain number of the scene
+        affects the column
     samples : int, number of samples
     uncertain : keys of the sampled numbers
 
@@ -152,7 +152,7 @@ def find_best(
 
 
 def _column(sweep: Sweep, column: str, combined: Combinations) -> Floats:
-    """Run combinations of values, and return a column (n,) of them, nan without a number."""
+    """Run combinations of values, and return a column (n,) of their results, or nan."""
     points = sweep.points(combined)
     outcome = sweep.run(points)
     if outcome.interrupted:
@@ -172,10 +172,10 @@ def optima(
     grid: Sequence[float],
     settings: Combinations,
 ) -> tuple[Floats, Floats]:
-    """Return the best values (n,) of a key for settings (n,) of other keys, refined beyond a grid
+    """Return the best values (n,) of a key for settings (n,) of other keys, refined from a grid
     (g,), and the column there, -inf if a setting has none.
 
-    `evaluate` returns the column (m,) of runs (m,), nan without a number.
+    `evaluate` returns the column (m,) of runs (m,), or nan.
     """
 
     def column_at(values: Floats) -> Floats:

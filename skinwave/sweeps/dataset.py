@@ -79,7 +79,7 @@ def _lock(descriptor: int) -> None:
 
 
 def append(out: Path, rows: Sequence[Row]) -> None:
-    """Add rows in one new file; cells may be missing."""
+    """Write rows to a new file; cells may be missing."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -93,7 +93,7 @@ def append(out: Path, rows: Sequence[Row]) -> None:
 
 
 def read(out: Path) -> list[dict[str, Any]]:
-    """Return all rows, each once, in the order of the design; raise a ValueError without rows."""
+    """Return all rows once, in the order of the design; raise a ValueError if there are none."""
     rows = list({row[KEY]: row for row in _table(out).to_pylist()}.values())
     if not rows:
         raise ValueError(f"{out} contains no rows of a sweep; name the folder of a sweep")
@@ -145,7 +145,7 @@ def _part(path: Path) -> Any:
 
 
 def csv_of(rows: Iterable[Row]) -> bytes:
-    """Return rows as CSV, with one column for each probe of a list."""
+    """Return rows as CSV; a list becomes one column for each probe."""
     flat = [dict(each for name, value in row.items() for each in _cells(name, value))
             for row in rows]  # fmt: skip
     columns = list(dict.fromkeys(name for row in flat for name in row))
@@ -172,7 +172,7 @@ def write_beside(out: Path, files: Mapping[str, bytes]) -> None:
 
 
 def check_own_files(out: Path, names: Iterable[str]) -> None:
-    """Raise a ValueError if a file to replace was not written by this program."""
+    """Raise a ValueError if a file to be replaced was not written by skinwave, or was changed."""
     known = outputs.listed_files(out) or {}
     for name in names:
         path = out / name

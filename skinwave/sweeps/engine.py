@@ -34,7 +34,7 @@ def check(scheduler: str) -> None:
 
 
 def worker_count(scheduler: str, workers: int | None = None) -> int:
-    """Return the number of runs at a time: `workers`, or all cores or threads of the scheduler."""
+    """Return the number of simultaneous runs: `workers`, or all cores or scheduler threads."""
     if workers is not None and workers < 1:
         raise ValueError(f"--workers is {workers}; give 1 or more")
     if scheduler in LOCAL:
@@ -50,7 +50,7 @@ def run_all(
     count: int,
     done: Callable[[int, Any], None],
 ) -> None:
-    """Call `done` here with the index and the result of each item as soon as it is computed.
+    """Compute items on workers; call `done(index, result)` here as each one is finished.
 
     If a worker is killed, others repeat its item. Items that kill every worker are left out.
     """

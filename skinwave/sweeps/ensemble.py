@@ -1,8 +1,8 @@
 """Vibration of many samples of a scene's uncertain numbers.
 
 The wavenumber integral gives the probes and a map in the steady state, where it is exact. A
-reduced-order model that the bodies of samples share gives the probes in the steady state. Otherwise
-the model of the scene computes each sample. Motion of a linear body is proportional to the
+reduced-order model shared by the bodies of samples gives the probes in the steady state. In other
+cases the model of the scene computes each sample. Motion of a linear body is proportional to the
 pressure, so that samples that differ only in pressure are solved once.
 """
 
@@ -57,9 +57,9 @@ SHARED = (0.01, 0.99)
 class Method:
     """How samples are solved.
 
-    `lines` are the names of the lines that are evaluated. Samples are solved with the `options`, or
-    by the wavenumber integral if `mapped`. If `same_load`, the loads of samples differ only in
-    pressure. `family`: bodies that are reduced together, for the steady state.
+    `lines` are the names of the evaluated lines. Samples are solved with the `options`, or by the
+    wavenumber integral if `mapped`. If `same_load`, the loads of samples differ only in pressure.
+    `family` are bodies that are reduced together, for the steady state.
     """
 
     lines: tuple[str, ...]
@@ -86,7 +86,7 @@ class Solution:
     waveform : (t, p) float, the last `SHOWN` of a Tacton
     lines : (f, p) float, amplitudes of the named lines
     rms : (p,) float
-    level : (p,) float, dB, highest sensation level as if on skin, `LOWEST_LEVEL` or more
+    level : (p,) float, dB, highest sensation level as if on skin, at least `LOWEST_LEVEL`
     map_rms, map_level : (ny, nx) float, RMS and level on a map; empty without a map
     """
 
@@ -100,7 +100,7 @@ class Solution:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ensemble(Solution):
-    """Vibration of n samples of a scene: arrays of `Solution` with a first axis (n,).
+    """Vibration of n samples of a scene: the arrays of `Solution`, with a first axis (n,).
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class Ensemble(Solution):
 
     @property
     def is_skin(self) -> bool:
-        """Whether the probes read the displacement of skin, so that levels are meaningful."""
+        """Whether the probes read the displacement of skin, for which levels are defined."""
         return self.scene.reading.is_plain and self.scene.body.is_skin
 
     @property
@@ -144,9 +144,8 @@ def propagate(
     """Solve a scene at a Latin hypercube of n samples of its uncertain numbers.
 
     `model` and `options`, h and solver, are those of `SolveOptions`, used where the wavenumber
-    integral is not exact. With several `workers` (processes), a script needs
-    `if __name__ == "__main__"`. Raises a ValueError if no number is uncertain, or the model refuses
-    a sample.
+    integral is not exact. With several `workers` (processes), a script needs `if __name__ ==
+    "__main__"`. Raises a ValueError if no number is uncertain or the model refuses a sample.
     """
     spreads = spreads_of(scene)
     values = samples(spreads, n, seed)
@@ -171,8 +170,8 @@ def shared_family(
     method: Method,
     progress: Progress = silent,
 ) -> Covering | None:
-    """Reduce the bodies of most samples (n, d) together, cached on disk; return None if separate
-    bodies cost less, or one reduction does not serve them.
+    """Reduce the bodies of most samples (n, d) together, cached on disk. Return None if separate
+    reductions cost less or a common one is not possible.
     """
     free = {}
     for spread, column in zip(spreads, values.T, strict=True):
@@ -197,7 +196,7 @@ def ensemble(
     workers: int = 1,
     progress: Progress = silent,
 ) -> Ensemble:
-    """Solve a scene at samples (n, d); the result does not depend on the number of processes."""
+    """Solve a scene at samples (n, d); the number of processes does not affect the result."""
     keys = tuple(spread.key for spread in spreads)
     different, factors = values.copy(), np.ones(len(values))
     if PRESSURE in keys and _is_proportional_to_pressure(scene, method):
@@ -369,12 +368,12 @@ def _compute(scene: Scene, method: Method) -> Solution:
 
 
 def _frequencies(scene: Scene, method: Method) -> Floats:
-    """Return the frequencies (f,) in Hz of the named lines, 0 for a line that a sample has not."""
+    """Return the frequencies (f,) in Hz of the named lines; 0 for a line that is absent."""
     return np.array([line_frequency(scene.tacton, name) or 0.0 for name in method.lines])
 
 
 def _amplitudes_at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats:
-    """Return amplitudes (g, p) at frequencies (g,), given those of lines at f (f,); 0 elsewhere."""
+    """Return amplitudes (g, p) at frequencies (g,), from those of lines at f (f,); 0 elsewhere."""
     near = np.abs(f - frequencies[:, None]) < 1e-6 * np.maximum(frequencies, 1.0)[:, None]
     values = near @ amplitudes
     return np.where(values > ROUND_OFF * values.max(initial=0.0), values, 0.0)

@@ -42,8 +42,8 @@ class SweepTable:
 
     Parameters
     ----------
-    rows : a mapping by column for each run, in the order of the design; a cell with a value for
-        each probe is a list
+    rows : mapping by column, for each run, in the order of the design; a cell with a value for each
+        probe is a list
     varied : keys that were varied
 
     >>> rows = [{"tacton.size_mm": d, "status": "done", "peak_um": [d / 2]} for d in (8, 10)]
@@ -67,7 +67,7 @@ class SweepTable:
 
     @property
     def failed(self) -> tuple[str, ...]:
-        """Error of each failed run."""
+        """Error messages, one for each failed run."""
         return tuple(row["error"] for row in self.rows if row["status"] != "done")
 
     def __getitem__(self, column: str) -> list[Any]:
@@ -76,7 +76,7 @@ class SweepTable:
         return [row.get(column) for row in self.rows]
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return a data frame with a row for each run; column names end with their unit."""
+        """Return a data frame with a row for each run; column names end in their unit."""
         return library("pandas").DataFrame([dict(row) for row in self.rows])
 
     def plot(
@@ -84,8 +84,8 @@ class SweepTable:
     ) -> Axes:
         """Draw a column over key `x`, with a curve for each value of key `by`.
 
-        The keys are the varied ones by default. The column shows its largest value over the probes,
-        or that of one probe, as in "peak_um[2]".
+        By default the keys are the varied ones. The column is that of the largest value over the
+        probes or, as in "peak_um[2]", that of one probe.
         """
         choose("column", column.partition("[")[0], self.columns)
         x = x or self.varied[0]
@@ -127,21 +127,21 @@ def sweep(
     seed: int = 0,
     **options: Any,
 ) -> SweepTable:
-    """Simulate a scene with other values of keys of its file; each body is reduced once.
+    """Simulate a scene with various values of keys of its file; each body is reduced once.
 
     A run that fails is a row with its error.
 
     Parameters
     ----------
     scene : Scene
-    vary : values by key, such as "tacton.speed_m_per_s"; or text as for `--vary` of the command,
+    vary : values by key, such as "tacton.speed_m_per_s"; or texts as for the option `--vary`,
         "1:12:12" or "normal(25e3,0.3)"
     design : "factorial", every value with every other; "zip", first with first; "lhs" or "sobol"
     samples : int, runs of "lhs", or rows of each matrix of "sobol"
     seed : int, of the samples
     **options
-        model, tolerance, h and solver of every run, as for `skinwave.simulate`; `folder`, which
-        keeps the rows, so that an interrupted sweep resumes; `scheduler`, "threads", "processes"
+        model, tolerance, h and solver of every run, as in `skinwave.simulate`; `folder`, which
+        stores the rows, so that an interrupted sweep resumes; `scheduler`, "threads", "processes"
         (a script needs a main guard), or the address of a Dask scheduler; `workers`, the number of
         runs at a time on this machine; `progress`, True for a bar, or a function of the name of the
         phase and the fraction done.
@@ -153,7 +153,7 @@ def sweep(
     Raises
     ------
     ValueError
-        If a key or a value does not belong to a scene, or the extra "sweep" is not installed.
+        If a key or a value is not valid for a scene, or the extra "sweep" is not installed.
 
     Examples
     --------
@@ -187,12 +187,12 @@ def best_value(
     Parameters
     ----------
     scene : Scene
-    vary : one key and three or more of its numbers, as for `sweep`
+    vary : one key and three or more of its numbers, as in `sweep`
     column : of the table, such as "level_db[0]"; without an index, the largest over the probes
     samples : int, samples of the spreads of the scene for the interval; 199 by default
     seed : int, of the samples
     **options
-        As for `sweep`.
+        As in `sweep`.
 
     Returns
     -------
@@ -201,8 +201,7 @@ def best_value(
     Raises
     ------
     ValueError
-        If several keys vary, their values are not numbers, the column has no numbers, or as for
-        `sweep`.
+        If several keys vary, if values or the column are not numbers, and as in `sweep`.
 
     Examples
     --------

@@ -40,8 +40,7 @@ def input_columns(point: DesignPoint) -> dict[str, Any]:
 def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
     """Return the columns of a response: amplitudes, agreement with the point kernel, and cost.
 
-    Lines with columns are the strongest of the load, those of the claims, and that of a moving
-    support.
+    The lines are the strongest of the load, those of the claims, and that of a moving support.
     """
     kernel, of_body = response, response.record.of_body
     if of_body:
@@ -89,7 +88,7 @@ def plain(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def unit_of(record: Quantity) -> str:
-    """Return the unit at the end of the column names of a quantity."""
+    """Return the unit in the column names of a quantity."""
     return "um" if record is DISPLACEMENT else record.column
 
 

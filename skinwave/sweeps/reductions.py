@@ -42,10 +42,10 @@ Distribute = Callable[[Callable[[Any], Any], Sequence[Any], Callable[[int, Any],
 
 @dataclass(frozen=True, kw_only=True)
 class Mesh:
-    """Element sizes in m of the two meshes of a reduction: `h` of its runs, and `coarser` for their
-    error; or the `error` of making them.
+    """Element sizes in m of the two meshes of a reduction: `h` for its runs, and `coarser` for
+    their error; or the `error` that prevented them.
 
-    For a body of a `family`, also the body that is `meshed`, and the `values` of its free keys.
+    For a body of a `family`, also the `meshed` body, and the `values` of its free keys.
     """
 
     h: float = 0.0
@@ -74,7 +74,7 @@ def model_of(scene: Scene, model: str) -> str:
 
 
 def solid_of_run(point: DesignPoint, options: SolveOptions) -> Solid | None:
-    """Return the subject of the reduction of a run; None if its model has none."""
+    """Return what a run's reduction depends on; None if its model needs no reduction."""
     scene = point.scene
     if (
         scene is None
@@ -86,7 +86,7 @@ def solid_of_run(point: DesignPoint, options: SolveOptions) -> Solid | None:
 
 
 def solid_of(scene: Scene) -> Solid:
-    """Return the subject of the reduction of a scene."""
+    """Return what the reduction of a scene's body depends on."""
     return scene.body, scene.probes, scene.reading, scene.load
 
 
@@ -131,7 +131,7 @@ def shared_meshes(
 
 
 def _highest_line(point: DesignPoint) -> float:
-    """Return the highest line in Hz of a load that is not negligible."""
+    """Return the highest relevant line of a load in Hz."""
     assert point.scene
     return max(named_lines(point.scene.pressure, NEGLIGIBLE_LINE).values(), default=0.0)
 
@@ -147,14 +147,14 @@ def _mesh_or_error(
 
 
 def error_text(error: Exception) -> str:
-    """Return an error as an entry of the table, with its type unless it is a message to users."""
+    """Return an error as a cell of the table, with its type unless it is a message to users."""
     text = " ".join(str(error).split())
     is_message = isinstance(error, ValueError | ArithmeticError) and text
     return text if is_message else f"{type(error).__name__}: {text}"
 
 
 def mesh_of_body(options: SolveOptions, scene: Scene) -> Mesh:
-    """Reduce a body on the mesh that its hardest scene needs, cached on disk for all workers."""
+    """Reduce a body on the mesh for its most demanding scene, cached on disk for all workers."""
     if not options.h:
         pair = refine(scene, scene.body, options)
         return Mesh(h=pair.h, coarser=pair.compared)
@@ -166,8 +166,8 @@ def mesh_of_body(options: SolveOptions, scene: Scene) -> Mesh:
 
 
 def mesh_of_family(options: SolveOptions, family: Covering) -> Mesh:
-    """Reduce a family on the mesh that its hardest scene needs, unless its size is given; raise a
-    ValueError if its bodies cannot be reduced together.
+    """Reduce a family on the mesh that its most demanding scene needs, unless the size is given;
+    raise a ValueError if its bodies cannot be reduced together.
     """
     size = options.h or refine(family.scene, family.hardest, options).h
     bodies = cached_shared_body(family, size, options.tolerance, options.solver).bodies
@@ -180,7 +180,7 @@ def mesh_of_family(options: SolveOptions, family: Covering) -> Mesh:
 def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, Mesh]:
     """Return the response of a reduced body with its expected error, and the mesh.
 
-    If the mesh of its family is too coarse for a run, the run gets a mesh of its own.
+    A run for which the mesh of its family is too coarse gets a mesh of its own.
     """
     if mesh.error:
         raise ValueError(mesh.error)
@@ -220,7 +220,7 @@ def prepare_body(
 def families(hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int = 1) -> Families:
     """Group bodies into families, given the run with the highest line of each body.
 
-    A family has many thicknesses if this pays, and otherwise one.
+    A family has many thicknesses if this saves time, otherwise one.
     """
     found: Families = []
     for moving in (True, False):
@@ -240,7 +240,7 @@ def families(hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: in
 
 
 def _limits(points: Iterable[DesignPoint]) -> Limits:
-    """Return the least and the largest value of each varied number of a body."""
+    """Return the lowest and the highest value of each varied number of a body."""
     values: dict[str, set[float]] = {}
     for point in points:
         for key, value in point.varied.items():
@@ -255,7 +255,7 @@ def _free_keys_of(
 ) -> tuple[FreeKey, ...]:
     """Return the varied keys that can be free in a family, with those that move a mesh if `moving`.
 
-    There are none if the keys do not describe the body completely.
+    There are none unless these keys explain all differences between the bodies.
     """
     if not point.before:
         return ()

@@ -34,7 +34,7 @@ def samples(spreads: Sequence[Spread], n: int, seed: int = 0) -> Floats:
 
 
 def check(spreads: Sequence[Spread], n: int, seed: int) -> None:
-    """Raise a ValueError for numbers that cannot be sampled."""
+    """Raise a ValueError if the numbers cannot be sampled."""
     if not spreads:
         raise ValueError(
             "no number of this scene is uncertain; give one a spread, such as "
@@ -47,9 +47,7 @@ def check(spreads: Sequence[Spread], n: int, seed: int) -> None:
 
 
 def one_at_a_time(spreads: Sequence[Spread]) -> Floats:
-    """Return samples (1 + 2 d, d): all central values, then each number at its quantiles `ENDS`
-    with the others at their central values.
-    """
+    """Return samples (1 + 2 d, d): central values, then each number at its quantiles `ENDS`."""
     values = np.tile([s.value for s in spreads], (1 + 2 * len(spreads), 1))
     for k, spread in enumerate(spreads):
         values[1 + 2 * k : 3 + 2 * k, k] = spread.at(ENDS)
@@ -58,8 +56,8 @@ def one_at_a_time(spreads: Sequence[Spread]) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SobolIndices:
-    """Sobol' indices (d,) of one output from n samples of each matrix, `first` order and `total`,
-    and the half widths of their 95 % intervals, `first_error` and `total_error`.
+    """Sobol' indices (d,) of one output from n samples of each matrix: `first` order and `total`,
+    and half widths of their 95 % intervals, `first_error` and `total_error`.
     """
 
     first: Floats

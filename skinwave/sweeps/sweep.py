@@ -36,7 +36,7 @@ Combinations = Sequence[Mapping[str, Any]]  # values by key, for each run
 
 @dataclass(frozen=True, kw_only=True)
 class SweepOutcome:
-    """Numbers of runs: `planned`, done `earlier`, and `done` or `failed` now."""
+    """Numbers of runs: `planned`, done `earlier`, and `done` or `failed` in this call."""
 
     planned: int
     earlier: int
@@ -47,7 +47,7 @@ class SweepOutcome:
 
     @property
     def missing(self) -> int:
-        """Number of runs that are not in the table yet."""
+        """Number of runs without a row."""
         return self.planned - self.earlier - self.done - self.failed
 
 
@@ -60,11 +60,11 @@ class Sweep:
     folder : a new folder, or that of an earlier sweep, which is resumed
     points : function of combinations of values that returns the point of each
     options : model, tolerance, h and solver of all runs
-    assessed : whether the error of runs without a mesh is estimated
+    assessed : whether to estimate the error of runs without a mesh
     progress : called with the name of the phase and the fraction done
     scheduler : "processes", "threads", or the address of a Dask scheduler
     workers : number of runs at a time on this machine; all cores by default
-    command : entry in the record.json of a new folder, as of `record.command_entry`
+    command : `record.command_entry` for the record.json of a new folder
     """
 
     folder: Path
@@ -79,7 +79,7 @@ class Sweep:
     def run(self, points: Sequence[DesignPoint]) -> SweepOutcome:
         """Run every point without a row in the folder, and append its row.
 
-        Rows that are written survive an interrupt. A run that fails is a row with its error.
+        Written rows survive an interrupt. A run that fails is a row with its error.
         """
         choose("model", self.options.model, ("auto", *names()))
         engine.check(self.scheduler)
@@ -145,7 +145,7 @@ class Sweep:
     def _batches(
         self, runs: Mapping[str, DesignPoint], meshes: Mapping[Solid, Mesh], count: int
     ) -> list[tuple[dict[str, DesignPoint], Mesh | None]]:
-        """Group runs on one body, and other runs if they are short."""
+        """Group runs on the same body, and short runs."""
         groups: dict[Solid | None, list[str]] = {}
         for name, point in runs.items():
             groups.setdefault(solid_of_run(point, self.options), []).append(name)
@@ -188,7 +188,7 @@ def _row(
 
 
 def _alone(scene: Scene, options: SolveOptions, assessed: bool) -> Response:
-    """Return the response of a run that shares no reduction."""
+    """Return the response of a run without a shared reduction."""
     model = model_of(scene, options.model)
     if assessed or named(model).default_size is not None:
         own = SolveOptions(

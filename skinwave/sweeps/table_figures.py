@@ -56,7 +56,7 @@ def finished_rows(rows: Sequence[Row]) -> list[Row]:
 
 
 def value(row: Row, column: str) -> float:
-    """Return a cell as a number: the largest over the probes, or that of one probe, `name[2]`."""
+    """Return a cell as a number: the largest over the probes or, as in `name[2]`, of one."""
     name, probe = at_probe(column)
     cells = row.get(name)
     if not isinstance(cells, list):
@@ -70,8 +70,8 @@ def value(row: Row, column: str) -> float:
 def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style: Style) -> Figure:
     """Draw a column over key x, with a curve for each value of key `by`, as `curves`.
 
-    Levels come with the detection threshold, and drawing speeds with the speed of surface waves.
-    Raises a ValueError if the column has no numbers.
+    Figures of levels show the detection threshold, those over drawing speed the speed of surface
+    waves. Raises a ValueError if the column has no numbers.
     """
     _check(rows, (column, x, *([by] if by else [])))
     with mpl.rc_context(style.rc):
@@ -90,7 +90,7 @@ def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style:
 
 
 def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) -> Figure:
-    """Draw a map of a column over two keys: the mean of the runs of a cell, or an empty cell.
+    """Draw a map of a column over two keys: cells are means of runs, or empty.
 
     Raises a ValueError if the column has no numbers, or the runs do not lie on a grid.
     """
@@ -122,7 +122,7 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
 def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -> None:
     """Draw a curve for each value of key `by`: mean and range of the runs at a value of key x.
 
-    If other keys vary and each pair of values occurs once, draw points, as for a Latin hypercube.
+    Draw points if other keys vary and each pair of values occurs once, as in a Latin hypercube.
     """
     groups = _levels(rows, by) if by else [None]
     words = not isinstance(_levels(rows, x)[0], float)

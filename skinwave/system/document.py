@@ -31,8 +31,8 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 @dataclass(frozen=True)
 class Picture:
-    """An image of a `kind`, with a caption. With a `name`, `files` by suffix (by default the image)
-    are written beside the page.
+    """An image of a `kind`, with a caption. With a `name`, `files` by suffix, by default the image,
+    are written next to the page.
     """
 
     image: bytes
@@ -74,7 +74,7 @@ class Details:
 
 @dataclass(frozen=True)
 class Choice:
-    """Parts by name, of which a page shows one at a time; `name` is that of the choice."""
+    """Parts by name, of which a page shows one at a time; `name` is the name of the choice."""
 
     name: str
     options: "Mapping[str, Part]"
@@ -97,7 +97,7 @@ Part = str | Table | Picture | Section | Details | Choice
 class Report:
     """A page: title, paragraphs of the verdict, and parts.
 
-    Warnings of named `efforts` come first. Files of pictures go into the folder `pictures`.
+    Warnings of `efforts`, given by name, come first. Pictures are written to the folder `pictures`.
     """
 
     title: str
@@ -116,7 +116,7 @@ class Report:
         return render("page.html", title=self.title, body=body, policy=_policy(body))
 
     def write(self, folder: Path) -> None:
-        """Write index.html into a folder, and files of every picture and table with a name."""
+        """Write index.html, and files of all named pictures and tables, into a folder."""
         beside = folder / self.pictures
         beside.mkdir(exist_ok=True)
         for one in _flat(self.parts):
@@ -170,19 +170,20 @@ def preformat(text: str) -> Markup:
 
 
 def warnings_banner(efforts: Iterable[tuple[str, Effort]]) -> Markup:
-    """Return all warnings of some responses by name for a page; empty without warnings."""
+    """Return all warnings of named responses for a page; empty without warnings."""
     return part("warnings", worst_warnings(efforts))
 
 
 def inner_page(page: str, caption: str) -> Markup:
-    """Return a page inside the page, on screens only; its scripts are isolated."""
+    """Return a page inside the page, for screens only; its scripts are isolated."""
     return part("inner_page", str(page), caption)
 
 
 def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
     """Return the warnings of some responses, with their names unless all have the same warnings.
 
-    Of warnings that differ only in numbers, return the one with the largest, and how many others.
+    If warnings differ only in numbers, the one with the largest is returned with the number of
+    others.
     """
     efforts = list(efforts)
     differ = len({tuple(effort.warnings) for _, effort in efforts}) > 1

@@ -34,7 +34,7 @@ class Clock:
 
 
 def peak_memory() -> int:
-    """Return the largest resident size of this process so far in bytes; 0 if it is unknown."""
+    """Return the largest resident size of this process in bytes; 0 if unknown."""
     try:
         import resource
     except ImportError:
@@ -48,9 +48,9 @@ _LOCK, _LIMIT, _WITHIN = Lock(), ExitStack(), [0]
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Limit linear algebra to one thread, because in small products threads wait for each other.
+    """Limit linear algebra to one thread: in small products threads only wait for each other.
 
-    The limit applies to the process. The first entry sets it and the last exit removes it.
+    The limit applies to the whole process, from the first entry to the last exit.
     """
     from threadpoolctl import threadpool_limits
 
@@ -86,11 +86,11 @@ def usable_cores() -> int:
 def threads() -> dict[str, str]:
     """Return the number of threads of linear algebra by environment variable.
 
-    The number of threads affects rounding.
+    This number affects rounding.
     """
     usable = os.environ.get(THREADS[0]) or str(usable_cores())
     return {name: os.environ.get(name) or usable for name in THREADS}
 
 
 def silent(phase: str, fraction: float) -> None:
-    """Ignore progress."""
+    """Progress callback that does nothing."""

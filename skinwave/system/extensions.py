@@ -26,7 +26,7 @@ def load() -> None:
 
 
 def add(registry: dict[str, T], name: str, record: T, made_by: Callable[..., Any] | None) -> None:
-    """Add a record to a registry, and the module of its function `made_by` to the environment;
+    """Register a record, and add the module of its function `made_by` to the environment variable;
     raise a ValueError if the name is taken.
     """
     if name in registry:

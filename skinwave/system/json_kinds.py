@@ -21,7 +21,7 @@ def fitting(value: Any, pattern: Any, where: str) -> Any:
     """Return a value that fits a pattern; raise a ValueError if it does not.
 
     A pattern is a type (float for any finite number), [pattern] for a list, {str: pattern} for a
-    table, or a table of patterns by key; "key?" may be missing.
+    table, or a table of patterns by key, where "key?" is optional.
     """
     if not _fits(value, pattern):
         raise ValueError(f"{where} has unexpected contents; compute the result again")
@@ -29,7 +29,7 @@ def fitting(value: Any, pattern: Any, where: str) -> Any:
 
 
 def is_finite_number(value: Any) -> bool:
-    """Whether a value is a finite number, and not a truth value."""
+    """Whether a value is a finite number, not a bool."""
     try:
         return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
     except OverflowError:  # of a large integer

@@ -10,13 +10,13 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of formulas in sp
 
 
 def printable(text: str, keep: str = "\n") -> str:
-    """Escape control, bidirectional and other invisible characters of a text, as JSON does."""
+    """Escape control, bidirectional and other invisible characters in a text, like JSON."""
     codes = {ord(c) for c in text if not (c.isprintable() or c in keep)}
     return text.translate({n: f"\\u{n:04x}" if n < 0x10000 else f"\\U{n:08x}" for n in codes})
 
 
 def say(text: str, file: TextIO | None = None) -> None:
-    """Print a text without control characters, and with escapes for characters that fail."""
+    """Print a text without control characters; escape those that cannot be encoded."""
     file = file or sys.stdout
     code = getattr(file, "encoding", None) or "utf-8"
     shown = printable(text).encode(code, "backslashreplace").decode(code)

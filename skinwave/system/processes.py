@@ -35,7 +35,7 @@ def environment(values: Mapping[str, str]) -> Iterator[None]:
 @contextmanager
 def pool(count: int, threads: int | None = 1, *, renewed: bool = False) -> "Iterator[Executor]":
     """Start `count` processes, each with `threads` of linear algebra unless the environment sets
-    them; None does not limit them. With `renewed`, each call has a new process. Unfinished work is
+    them; None sets no limit. With `renewed`, each call runs in a new process. Unfinished work is
     cancelled at the end.
     """
     from concurrent.futures import ProcessPoolExecutor
@@ -59,7 +59,7 @@ def pool(count: int, threads: int | None = 1, *, renewed: bool = False) -> "Iter
 
 
 def begin_worker(threads: int | None) -> None:
-    """Start a process of a pool, which ignores interrupts and ends with its parent."""
+    """Initialise a process of a pool: it ignores interrupts and ends with its parent."""
     from multiprocessing import parent_process
 
     from skinwave.system.effort import THREADS

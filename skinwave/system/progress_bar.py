@@ -12,8 +12,8 @@ STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.20, "reduce": 0.70}
 
 
 def step_of(phase: str, fraction: float) -> tuple[str, float]:
-    """Return the phase with the number of its step, and the share done of all steps; of a phase
-    that is not a step, its own share.
+    """Return the phase with the number of its step and the completed share of all steps; for other
+    phases, the share of the phase.
     """
     names, done = list(STEPS), min(max(fraction, 0.0), 1.0)
     step = phase.rpartition(": ")[2]

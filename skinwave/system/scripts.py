@@ -32,7 +32,7 @@ def json_for_script(data: Mapping[str, Any]) -> str:
 def bundle(folder: Traversable, entry: str) -> str:
     """Join the entry module and all modules of its folder that it imports into one script.
 
-    Raises a ValueError for a missing module or name, a circle, or an unsupported form of import.
+    Raises a ValueError for a missing module or name, a cycle, or an unsupported form of import.
     """
     texts: dict[str, str] = {}
     needed: dict[str, dict[str, set[str]]] = {entry: {}}  # names by module that each imports

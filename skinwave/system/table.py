@@ -17,8 +17,8 @@ STORED = 6  # significant digits of numbers in CSV files
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its `name` in CSV and JSON, such as "frequency_hz"; and on pages its `heading` (by
-    default the name), unit and significant digits.
+    """A column: its `name` in CSV and JSON, such as "frequency_hz"; for pages its `heading`, by
+    default the name, unit and significant digits.
     """
 
     name: str
@@ -34,10 +34,10 @@ class Column:
 
 @dataclass(frozen=True, init=False)
 class Table:
-    """Columns, given as `Column` or name, and rows of text, `Markup`, numbers or None (no value).
+    """Columns, each a `Column` or a name, and rows of text, `Markup`, numbers or None (no value).
 
-    With a `name`, the table is also written as a CSV file beside the page. Numbers in CSV have
-    `stored` significant digits.
+    With a `name`, the table is also written as a CSV file next to the page, with `stored`
+    significant digits.
 
     >>> table = Table([Column("f_hz", "frequency", "Hz"), "line"], [(127.38, "f_d"), (None, "2 f")])
     >>> table.to_csv()
@@ -60,7 +60,7 @@ class Table:
         object.__setattr__(self, "stored", stored)
 
     def only(self, *names: str, most: int | None = None) -> "Table":
-        """Return a table of some columns, and at most `most` rows."""
+        """Return a table with some columns and at most `most` rows."""
         at = [[column.name for column in self.columns].index(name) for name in names]
         at = at or list(range(len(self.columns)))
         rows = ([row[k] for k in at] for row in self.rows[:most])
@@ -72,7 +72,7 @@ class Table:
         return csv_table((column.name for column in self.columns), rows)
 
     def to_json(self) -> str:
-        """Return a list of objects, one a row, as JSON; null where there is no value."""
+        """Return a JSON list with an object for each row; null for no value."""
         names = [column.name for column in self.columns]
         rows = ([value if _is_known(value) else None for value in row] for row in self.rows)
         return json.dumps([dict(zip(names, row, strict=True)) for row in rows])

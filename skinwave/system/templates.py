@@ -21,13 +21,13 @@ def render(template: str, **values: object) -> str:
 
 
 def part(name: str, *values: object) -> Markup:
-    """Apply a macro of `parts.html` to values; text is escaped."""
+    """Apply a macro of `parts.html`; text is escaped."""
     made: Markup = getattr(_templates().get_template("parts.html").module, name)(*values)
     return made
 
 
 def typeset(text: str) -> Markup:
-    """Escape text and typeset its symbols; Markup does not change."""
+    """Escape text and typeset its symbols; `Markup` stays the same."""
     if isinstance(text, Markup):
         return text
     made = str(escape(text))

@@ -72,7 +72,7 @@ class Result:
 
     @property
     def worst(self) -> Check:
-        """The check nearest to its tolerance, or farthest beyond it."""
+        """The check closest to its tolerance, or farthest beyond it."""
         nothing = [below("no checks", np.nan, 0.0)]
         return max(
             self.checks or nothing, key=lambda c: np.inf if not c.passed else c.error / (c.bar or 1)
@@ -102,7 +102,7 @@ def relative(
 ) -> Check:
     """Check the relative error of a number, or the largest of several numbers, by magnitude.
 
-    All checks take SI units; `unit` is the one that is shown.
+    All checks take SI units; `unit` is that of the page.
     """
     value, reference = np.ravel(value), np.ravel(reference)
     errors = np.abs(value / reference - 1)

@@ -56,7 +56,7 @@ def slivers() -> Checks:
 
 @dataclass(frozen=True, kw_only=True)
 class Manufactured:
-    """A field (..., 3), its gradient (..., i, j), its body force (..., 3), and the fixed components
+    """A field (..., 3), its gradient (..., i, j) and body force (..., 3), and the fixed components
     on an eighth of the unit cube.
     """
 
@@ -134,7 +134,7 @@ def distorted_cube() -> TetMesh:
 
 
 def cube_with_slivers() -> TetMesh:
-    """Return a unit cube with one inner corner so near a facet that a dihedral angle is 0.5°."""
+    """Return a unit cube with an inner corner close to a facet: one dihedral angle is 0.5°."""
     straight = meshes.extrude(*[np.linspace(0, 1, 4)] * 3, order=1)
     corner = int(np.argmin(np.linalg.norm(straight.points - 1 / 3, axis=1)))
     tet = next(t for t in straight.tets if corner in t)

@@ -44,7 +44,7 @@ class Curves:
     length: Floats
 
     def at(self, quantity: Quantity, frequencies: ArrayLike) -> Floats:
-        """Return speeds or 1/e lengths (n,); nan beyond the frequencies and without a wave."""
+        """Interpolate speeds or 1/e lengths (n,); nan out of range and without a wave."""
         f = np.asarray(frequencies)
         values = self.speed if quantity is SPEED else self.length
         values = np.interp(f, self.frequencies, values, left=np.nan, right=np.nan)
@@ -54,7 +54,7 @@ class Curves:
 
 def leading_wave(body: Body, grid: ArrayLike | None = None) -> Curves:
     """Return the wave of a body that moves the surface most at the edge of the focal spot's main
-    lobe, at ascending frequencies (f,) in Hz (default `GRID`), and for half-spaces at rest.
+    lobe, at ascending frequencies (f,) in Hz (default `GRID`), for half-spaces also at rest.
     """
     at_rest = [AT_REST] if body.depth == inf else []
     f = np.array([*at_rest, *np.asarray(GRID if grid is None else grid)])
@@ -107,7 +107,7 @@ def focus_speeds(body: Body, perimeter: float) -> tuple[Floats, Floats]:
 
 
 def peak(x: Floats, y: Floats) -> float:
-    """Return the peak of the parabola through the highest point; nan at an end."""
+    """Return the peak of a parabola through the highest point; nan at an end."""
     k = int(np.argmax(y))
     if not 0 < k < len(x) - 1:
         return float("nan")
@@ -137,7 +137,8 @@ def along_finger(
 ) -> Finger:
     """Return the decay on the palmar side of the longest finger of a hand, by finite elements.
 
-    The palm in the `file` faces `HAND_UP`. Raises a ValueError if the file is missing or no body.
+    The palm in the `file` faces `HAND_UP`. Raises a ValueError if the file is missing or contains
+    no body.
     """
     if not file.is_file():
         raise ValueError(f"--hand {file} does not exist; give the mesh file of a hand")

@@ -1,4 +1,4 @@
-"""Published values that models are compared with, from `published.toml`.
+"""Published values for comparison with models, from `published.toml`.
 
 `how` is the quality of a set: read in the source, quoted elsewhere, from the abstract only, or
 computed from the source's numbers. `built` names the presets that were fitted to a source or chosen
@@ -38,9 +38,9 @@ QUANTITIES = {each.name: each for each in (SPEED, LENGTH, EXPONENT, FOCUS_SPEED)
 class Published:
     """Published `values` (n,) of one quantity, in SI, at `frequencies` (n,) in Hz.
 
-    A frequency is nan for a value without one, a value is nan where only a range is published.
-    `lows` and `highs` (n,) span people or a standard deviation; they are empty without a spread.
-    `bodies` of `predictions` are compared with the set.
+    A frequency is nan for a value without one; a value is nan if only a range is published. `lows`
+    and `highs` (n,) span people or a standard deviation; they are empty without a spread. `bodies`
+    of `predictions` are compared with the set.
     """
 
     name: str
@@ -115,7 +115,7 @@ NOT_COMPARED = tuple(tuple(each.values()) for each in _FILE["not_compared"])
 
 
 def all_sources(quantity: Quantity) -> Published:
-    """Return the range over all sources, at frequencies that at least two sources have."""
+    """Return the range over all sources, at frequencies that two or more sources have."""
     sets = [each for each in WAVES if each.quantity is quantity]
     ranges = {f: [x for each in sets if (x := each.at(f))] for f in np.arange(100.0, 701, 100)}
     shared = {float(f): pairs for f, pairs in ranges.items() if len(pairs) > 1}

@@ -65,7 +65,7 @@ SPEEDS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Compared:
-    """The value `ours` of a body, in SI or nan without a wave, and number k of a published set."""
+    """A body's value `ours`, in SI, nan without a wave, and value number k of a published set."""
 
     published: Published
     k: int
@@ -74,7 +74,7 @@ class Compared:
 
     @property
     def is_built(self) -> bool:
-        """Whether the body was made from this source, so that agreement is no evidence."""
+        """Whether the body was fitted to this source, so that agreement is no evidence."""
         return self.body in self.published.built
 
     @property
@@ -84,7 +84,7 @@ class Compared:
 
     @property
     def factor(self) -> float:
-        """Ours over the nearest published value: 1 within the spread, nan without ours."""
+        """Our value over the nearest published one: 1 within the spread, nan without our value."""
         low, high = self.published.between(self.k)
         margin = 0.0 if self.published.lows else READING_ERROR
         if (1 - margin) * low <= self.ours <= (1 + margin) * high:
