@@ -1,6 +1,6 @@
-"""Reference pages from the code: Markdown replaces `<!-- generated: name -->` in a page.
+"""Reference pages from the code: generated Markdown replaces `<!-- generated: name -->` in a page.
 
-The pages list parsers, keys, registries and docstrings of the program itself.
+It lists options of parsers, keys, registries and docstrings of the program.
 """
 
 import argparse

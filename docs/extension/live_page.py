@@ -1,4 +1,4 @@
-"""The live page in the home page, with the skin slab and the paper sheet."""
+"""The live page on the home page of the site, with the skin slab and the paper sheet."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
