@@ -42,7 +42,7 @@ myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 suppress_warnings = ["config.cache"]  # functions in the settings of the gallery
 
-nitpicky = True  # for pages and labels; annotations have types of numpy, which has its own site
+nitpicky = True  # checks pages and labels; types of annotations are left out below
 nitpick_ignore_regex = [(r"py:.*", r".*")]
 default_role = "code"
 highlight_language = "none"  # for formulas in docstrings; code blocks name their language
