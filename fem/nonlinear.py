@@ -189,9 +189,8 @@ def dynamic(
         except _Stuck as stuck:
             raise Diverged(
                 f"step {step} of dt = {dt:g} s, to t = {start.time + step * dt:g} s, did not "
-                f"converge in {2**MOST_HALVINGS} parts: the residual is {stuck.args[0]:.2g} of the "
-                f"load, with corrections above {tolerance:g} of a part; shorten dt or lower the "
-                "load"
+                f"converge in {2**MOST_HALVINGS} parts to a tolerance of {tolerance:g}; the "
+                f"residual is {stuck.args[0]:.2g} of the load; shorten dt or lower the load"
             ) from None
 
 

@@ -90,7 +90,7 @@ def load_arrays(path: PathLike) -> dict[str, Array]:
                 size = sum(member.file_size for member in archive.infolist())
             if size > limit:
                 raise ValueError(
-                    f"unpacks to {size / 1e6:,.0f} MB, the limit is {limit / 1e6:,.0f} MB"
+                    f"unpacks to {size / 1e6:,.0f} MB, more than {limit / 1e6:,.0f} MB"
                 )
             file.seek(0)
             with np.load(file, allow_pickle=False) as archive:

@@ -53,7 +53,7 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     off = np.abs(level_set(palm, points[_on_boundary(cells).ravel()])).max()
     if sharpest < SHARPEST or off > OFF * palm.thickness:
         raise MeshError(
-            f"a mapped mesh of this palm has a least dihedral angle of {sharpest:.2g} degrees "
+            f"a mapped mesh of this palm has a smallest dihedral angle of {sharpest:.2g} degrees "
             f"(limit {SHARPEST:g} degrees) and misses its surface by {1e3 * off:.2g} mm; use a "
             "lower relief"
         )

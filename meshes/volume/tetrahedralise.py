@@ -236,8 +236,8 @@ def _checked_result(surface: Surface, epsilon: float, points: Floats, tets: np.n
     if not angles.min() >= SHARPEST:
         raise MeshError(
             f"{(angles < SHARPEST).sum():,} tetrahedra have dihedral angles below {SHARPEST:g} "
-            f"degrees, the least is {angles.min():.2g} degrees; smooth the surface or use "
-            "smaller elements"
+            f"degrees, down to {angles.min():.2g} degrees; smooth the surface or use smaller "
+            "elements"
         )
     log.info("%d tetrahedra, least dihedral angle %.1f degrees", len(mesh.tets), angles.min())
     return mesh

@@ -164,9 +164,9 @@ def check_modulus(frequencies: Floats, moduli: Complex) -> None:
     if mean > CAUSAL:
         raise ValueError(
             f"the complex modulus is not causal: it differs by {100 * mean:.0f} % from the nearest "
-            f"relaxing solid (root mean square, the limit is {100 * CAUSAL:g} %), at "
-            f"{frequencies[worst]:.3g} Hz by {100 * away[worst]:.0f} %; where the loss modulus is "
-            "large, the storage modulus must rise: check both, or give a loss_factor"
+            f"relaxing solid (root mean square; the limit is {100 * CAUSAL:g} %), at "
+            f"{frequencies[worst]:.3g} Hz by {100 * away[worst]:.0f} %; the storage modulus must "
+            "rise where the loss modulus is large: check both, or give a loss_factor"
         )
 
 

@@ -46,8 +46,8 @@ class Stack:
         choose("base", self.base, BASES)
         if (self.base == "elastic") != (0 < self.base_stiffness < inf):
             raise ValueError(
-                f"base_stiffness = {self.base_stiffness} N/m3 does not fit a base that is "
-                f"{self.base}; give a finite stiffness above 0 for an elastic base, else 0"
+                f"base_stiffness = {self.base_stiffness} N/m3 does not fit base = "
+                f"'{self.base}'; give a finite stiffness above 0 for an elastic base, else 0"
             )
 
     @property

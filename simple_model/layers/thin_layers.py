@@ -90,7 +90,7 @@ def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
     if len(layers) > MOST:
         raise ValueError(
             f"dispersion curves up to {omega.max() / 2 / np.pi:g} Hz of layers of {1e3 * finite:g} "
-            f"mm need {len(layers)} elements in depth, and the limit is {MOST}; use a half-space, "
+            f"mm need {len(layers)} elements in depth, more than {MOST}; use a half-space, "
             "thinner or fewer layers, or lower frequencies"
         )
     return layers, np.array(lengths, np.complex128).T

@@ -94,8 +94,8 @@ class MovingPressure:
             return
         if not self.law.is_product(tacton.amplitude, self.depth_of_modulation):
             raise ValueError(
-                f"drive law '{self.law}' is not a product of a factor of the level and a factor of "
-                "the modulation, which levels of a path, rhythms and envelopes require; remove "
+                f"drive law '{self.law}' is not a product of factors for the level and for the "
+                "modulation, so that it supports no path levels, rhythm or envelope; remove "
                 "these, or use another drive law"
             )
 

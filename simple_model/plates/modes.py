@@ -179,7 +179,7 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
     if (dofs := max(x.size * y.size for x, y in product(*bases))) > MOST_DOFS:
         raise ValueError(
             f"a plate of {1e3 * plate.size_x:g} by {1e3 * plate.size_y:g} mm needs {dofs:,} "
-            f"degrees of freedom, and the limit is {MOST_DOFS:,}; lower finest = {max(resolved):g}"
+            f"degrees of freedom, more than {MOST_DOFS:,}; lower finest = {max(resolved):g}"
         )
     return PlateModes(plate=plate, families=tuple(_family(plate, x, y) for x, y in product(*bases)))
 

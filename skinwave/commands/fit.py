@@ -97,7 +97,7 @@ def _inspect(options: argparse.Namespace) -> int:
     from skinwave.measure.inspection_page import summary, text, write
 
     if options.scene or options.measured or options.vary:
-        raise ValueError("--inspect does not fit; remove SCENE, --measured and --vary")
+        raise ValueError("--inspect only reads a file; remove SCENE, --measured and --vary")
     found = inspect(_read_measurement(options.inspect, options), alarm=options.false_alarm)
     contents, lines = summary(found), text(found)
     if options.out:

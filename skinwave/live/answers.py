@@ -74,7 +74,7 @@ def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
     mean = measured.values.mean(axis=0)
     if mean.size > MOST_VALUES:
         raise ValueError(
-            f"{name} has {mean.size:,} values, the limit is {MOST_VALUES:,}. Use skinwave compare."
+            f"{name} has {mean.size:,} values, more than {MOST_VALUES:,}. Use skinwave compare."
         )
     places = [[*place] if np.isfinite(place).all() else None for place in measured.places.tolist()]
     curves = {

@@ -238,7 +238,7 @@ def _times_within(
         return np.empty(0), values
     column = f"column {rising[0] + 1} of '{name[:40]}' rises evenly"
     if given.rate is None:
-        raise ValueError(f"{column} as times do; give --rate, or save times as an array 't' in s")
+        raise ValueError(f"{column} like times; give --rate, or save times as an array 't' in s")
     remarks.append(f"{column} and is taken as time")
     return values[0, :, rising[0]].astype(float), np.delete(values, rising[0], axis=2)
 

@@ -237,8 +237,8 @@ def at_measured_places(scene: Scene, measurement: Measurement) -> Scene:
     if np.isfinite(measurement.places).all():
         scene = replace(scene, probes=tuple(map(tuple, measurement.places.tolist())))
     elif len(scene.probes) != len(measurement.places):
-        count = f"{len(measurement.places)} signals at unknown places"
-        raise ValueError(f"give as many probes: {len(scene.probes)} probes, but {count}")
+        signals = f"{len(measurement.places)} signals at unknown places"
+        raise ValueError(f"{len(scene.probes)} probes do not fit {signals}; give a probe for each")
     lines_to_compare(measurement, scene)
     return scene
 

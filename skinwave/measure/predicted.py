@@ -110,7 +110,7 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
     if not quantity.is_normal:
         raise ValueError(f"a fit needs motion normal to the body, not {quantity.words}")
     if not np.isfinite(places).all():
-        raise ValueError("some places are unknown; give --places, or select others by --columns")
+        raise ValueError("some places are unknown; give --places, or choose others with --columns")
     record = named(model)
     if not record.needs_body:
         raise ValueError(f"{model} has no body to fit; choose another model")
@@ -179,9 +179,9 @@ def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     apart = np.abs(f[at] - frequencies) > SAME_LINE * frequencies
     if apart.any():
         raise ValueError(
-            f"the load has no line at the measured {frequencies[apart][0]:.1f} Hz with "
-            f"{', '.join(f'{key} = {value:g}' for key, value in values.items())}; do not vary what "
-            "moves the lines, or fit waveforms from rest"
+            f"the load has no line at the measured {frequencies[apart][0]:.1f} Hz if "
+            f"{', '.join(f'{key} = {value:g}' for key, value in values.items())}; do not vary keys "
+            "that change its lines, or fit waveforms from rest"
         )
     return np.asarray(a[at])
 

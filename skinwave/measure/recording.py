@@ -51,7 +51,7 @@ class Given:
 
     def __post_init__(self) -> None:
         if self.sign not in (None, 1, -1):
-            raise ValueError(f"sign = {self.sign} must be 1, into the body, or -1, out of it")
+            raise ValueError(f"sign = {self.sign} must be 1 (into the body) or -1 (out of it)")
         if self.places is not None:
             object.__setattr__(self, "places", np.atleast_2d(self.places).astype(float))
 
@@ -95,7 +95,7 @@ def complete(recording: Recording, given: Given, path: Path) -> Measurement:
     still = np.flatnonzero((values == values[:, :1]).all(axis=(0, 1))) + 1
     if len(still) and values.shape[1] > 1:
         remarks.append(f"place {', '.join(map(str, still[:8]))} has the same value throughout; "
-                       "choose others by --columns")  # fmt: skip
+                       "choose others with --columns")  # fmt: skip
     if not sign:
         remarks.append("the file gives no sign: positive is taken as into the body; use "
                        "--positive out to flip it")  # fmt: skip
@@ -220,7 +220,7 @@ def _even_times(times: Floats) -> tuple[Floats, np.ndarray]:
     if len(times) < 2:
         return times, index
     if not steps.min() > 0:
-        raise ValueError("times must rise; sort them, or give --rate if they are rounded")
+        raise ValueError("times must rise; sort them or, if they are rounded, give --rate")
     if np.abs(steps - steps.mean()).max() <= UNEVEN * steps.mean():
         return times, index
     step = float(np.median(steps))
@@ -231,9 +231,9 @@ def _even_times(times: Floats) -> tuple[Floats, np.ndarray]:
     allowed = max(UNEVEN * step, min(rounding, LARGEST_ROUNDING * step))
     if np.diff(index).min() < 1 or away > allowed:
         steps_s = f"{steps.min():g} to {steps.max():g} s"
-        raise ValueError(f"times must rise in equal steps, not {steps_s}; give --rate if rounded")
+        raise ValueError(f"times must rise in equal steps, not {steps_s}; if rounded, give --rate")
     if (missing := index[-1] + 1 - len(index)) > LARGEST_GAPS * len(index):
-        raise ValueError(f"{missing} rows are missing between {len(index)}; give a complete part")
+        raise ValueError(f"{missing} rows are missing among {len(index)}; give a part without gaps")
     full = start + step * np.arange(index[-1] + 1)
     if away <= UNEVEN * step:
         full[index] = times
@@ -244,11 +244,11 @@ def _complete_part(values: Floats) -> slice:
     """Return the samples between the first and last value that all places of (r, n, p) have."""
     known, count = ~np.isnan(values), values.shape[1]
     if not known.any(axis=1).all():
-        raise ValueError("a repetition of a place has no value; choose others by --columns")
+        raise ValueError("a repetition of a place has no value; choose others with --columns")
     part = slice(int(known.argmax(axis=1).max()), count - int(known[:, ::-1].argmax(axis=1).max()))
     if part.stop - part.start < (1 - LARGEST_GAPS) * count:
         common = max(part.stop - part.start, 0)
-        raise ValueError(f"only {common} of {count} samples are common to all places; give a part")
+        raise ValueError(f"only {common} of {count} samples are common to all places; export these")
     return part
 
 

@@ -132,7 +132,7 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
     directions = [_DIRECTION.search(c.text.lower()) for c in columns if quantity_of(c.unit)]
     axes = sorted({match[1] for match in directions if match})
     if len(axes) > 1 and not (chosen or has_places):
-        raise ValueError(f"columns are along {', '.join(axes)}; choose one by --columns")
+        raise ValueError(f"columns are along {', '.join(axes)}; choose one with --columns")
     for k, column in enumerate(columns) if len(columns) > 1 else ():
         if not column.may_be_motion or column.is_motion or k in chosen or not rises(numbers[:, k]):
             continue
@@ -188,7 +188,7 @@ def _one_time(columns: list[Column], numbers: Floats) -> list[Column]:
     for k in others:
         if not np.array_equal(numbers[:, k], numbers[:, first]):
             names = f"'{columns[first].text}' and '{columns[k].text}'"
-            raise ValueError(f"the times {names} differ; export one of them")
+            raise ValueError(f"the columns of times {names} differ; export one of them")
     return [
         replace(column, role=INDEX) if k in times and k != first else column
         for k, column in enumerate(columns)
@@ -221,7 +221,7 @@ def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int
         if all(canonical(columns[k].unit) in DRIVE_UNITS for k in bare):
             unit = columns[bare[0]].unit
             raise ValueError(
-                f"columns {names} are in {unit}; choose by --columns, or give --places"
+                f"columns {names} are in {unit}; choose with --columns, or give --places"
             )
         remarks.append(f"columns {names} are taken as places; if one is the drive, give --columns")
     if not known:
@@ -308,7 +308,7 @@ def _common(series: Series, attribute: str, given: str) -> str:
     if len(values) > 1 and (is_mixed or not given):
         what = "quantity" if attribute == "role" else "unit"
         names = ", ".join(sorted(values))[:80]
-        raise ValueError(f"columns differ in {what}: {names}; choose by --columns or --quantity")
+        raise ValueError(f"columns differ in {what}: {names}; use --columns or --quantity")
     return str(values.pop()) if len(values) == 1 else ""
 
 

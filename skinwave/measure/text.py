@@ -204,7 +204,7 @@ def _header(above: list[str], layout: _Layout) -> tuple[list[str], list[str], No
     count = len(names) or (0 if units else width)
     if count and (count <= numeric[-1] or (count > width and not units)):
         cells = f"{width} cells between {DELIMITER_NAMES[layout.delimiter]}"
-        raise ValueError(f"line {at[-1] + 2} has {cells}, the header {count}; name each column")
+        raise ValueError(f"line {at[-1] + 2} has {cells}, but the header {count}; name each column")
     names, units = names + [""] * width, units + [""] * width
     notes += [
         (names[k].lower(), units[k])

@@ -188,7 +188,7 @@ def _part(body: Body, key: str) -> tuple[Part, tuple[str, ...]]:
     if region:
         if region not in (known := dict(body.regions)):
             raise ValueError(
-                f"'{key}' belongs to a region whose material the scene does not give; it gives "
+                f"'{key}' belongs to a region without a material in the scene; regions with one: "
                 f"{', '.join(known) or 'none'}"
             )
         return region, path
@@ -212,7 +212,7 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
         )
     if len(keys) > MOST_THICKNESSES:
         raise ValueError(
-            f"{len(keys)} thicknesses are free, the limit is {MOST_THICKNESSES}, because each "
+            f"{len(keys)} thicknesses are free, more than {MOST_THICKNESSES}, and each "
             "multiplies the number of meshes; free fewer"
         )
     if low := [key.key for key in keys if not key.low > 0]:
@@ -220,8 +220,8 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
     most = 1e3 * kind.equivalent(body) if kind.equivalent else inf
     if high := [key for key in keys if key.high > most * (1 + ROUND_OFF)]:
         raise ValueError(
-            f"{high[0].key} is free up to {high[0].high:g} mm, the limit is {most:g} mm for this "
-            f"{body.kind}, the thickness of its elements, which represent thinner sheets only; "
+            f"{high[0].key} is free up to {high[0].high:g} mm, above {most:g} mm, the "
+            f"thickness of the elements of a {body.kind}, which represent only thinner ones; "
             "narrow the range, or reduce a body for each value"
         )
 

@@ -212,7 +212,7 @@ def step_count(duration: float, dt: float) -> int:
         )
     if duration / dt > MOST_STEPS:
         raise ValueError(
-            f"dt = {dt:g} s makes {duration / dt:.2g} steps, the limit is {MOST_STEPS:,}; use a "
+            f"dt = {dt:g} s makes {duration / dt:.2g} steps, more than {MOST_STEPS:,}; use a "
             "longer step or a shorter duration"
         )
     return max(3, ceil(duration / dt - 1e-9))
@@ -238,7 +238,7 @@ def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respo
         lines = load_lines(scene.loads[0], threshold)
         if (count := len(np.unique(np.round(lines.frequencies, 9)))) > MOST_LINES:
             raise ValueError(
-                f"this load has {count:,} lines, the limit is {MOST_LINES:,}; use --model fem"
+                f"this load has {count:,} lines, more than {MOST_LINES:,}; use --model fem"
             )
         frequencies, pressures = meshed.load_lines_at(scene.loads, points, threshold)
         if not scene.body.is_held:  # under the mean an unconstrained body would drift

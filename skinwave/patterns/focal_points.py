@@ -44,7 +44,7 @@ def read(content: bytes, options: Options) -> Pattern:
     if len(points) > MOST_FOCI or (points != np.arange(len(points))).any():
         numbers = ", ".join(f"{p:g}" for p in points[:10])
         raise ValueError(
-            f"points have the numbers {numbers}; number at most {MOST_FOCI} points from 0"
+            f"points have the numbers {numbers}; count them from 0, at most {MOST_FOCI} points"
         )
     ordered = table[np.argsort(table["point"], kind="stable")]
     table = ordered.reshape(len(points), -1) if not np.ptp(counts) else ordered[None]

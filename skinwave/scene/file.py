@@ -239,7 +239,7 @@ def _preset(scene: dict[str, Any]) -> tuple[Body | None, dict[str, Any]]:
     if named is None:
         if (kind := str(body.get("kind"))) in BODIES and kind not in KINDS:
             raise ValueError(
-                f"body kind '{kind}' is unknown, but a preset; write preset = \"{kind}\""
+                f"'{kind}' is not a kind of body but a preset; write preset = \"{kind}\""
             )
         return None, scene
     name = choose("body preset", as_text("preset", named), BODIES)

@@ -165,7 +165,7 @@ def write_material(material: str | Material) -> Any:
 def _table(key: str, value: Any) -> ModulusTable:
     if isinstance(value, str):
         raise ValueError(
-            f"{key} = {value!r} names a file, which only a scene in a file can do; give its "
+            f"{key} = {value!r} names a file, which is possible only in a scene file; give the "
             f"numbers as {key}.{', '.join(COLUMNS)}"
         )
     where, columns = f"[body.material.{key}]", {n: SceneKey(n, _numbers, list) for n in COLUMNS}

@@ -133,7 +133,7 @@ class Scene:
         if isinstance(self.depth, tuple) and len(self.depth) != len(self.probes):
             raise ValueError(
                 f"depth_mm has {len(self.depth)} values for {len(self.probes)} probes; give one "
-                "or one each"
+                "for all or one for each"
             )
         if not (np.isfinite(self.depths).all() and min(self.depths) >= 0):
             raise ValueError(f"depth_mm = {1e3 * np.array(self.depth)} must be finite, 0 or above")

@@ -242,7 +242,7 @@ def _with_factors(body: Body, place: str, factors: dict[str, float]) -> Body:
 
 def _check_count(count: int) -> None:
     if not 1 <= count <= MOST_RUNS:
-        raise ValueError(f"{count:,} runs are outside 1 to {MOST_RUNS:,}; vary fewer values")
+        raise ValueError(f"the design has {count:,} runs; give values for 1 to {MOST_RUNS:,}")
 
 
 def _checked_key(key: str) -> str:

@@ -197,7 +197,7 @@ def test_a_table_is_read_from_the_folder_of_the_scene(tmp_path):
     assert point.scene.body.solid == expected
     (tmp_path / "moduli.csv").unlink()
     assert loads(dumps(own)) == own
-    with pytest.raises(ValueError, match=r"'moduli.csv' names a file.*give its numbers"):
+    with pytest.raises(ValueError, match=r"'moduli.csv' names a file"):
         loads(BODY + 'table = "moduli.csv"\n')
 
 
