@@ -11,7 +11,6 @@ def circle(f_d, size=0.02):
 
 
 def circling(size, speed, am=0.0, duration=1.0, **load):
-    """A focus of 1 Pa on a circle, with AM in Hz."""
     path = Trajectory(shape="circle", size=size, speed=speed)
     tacton = Tacton(am_frequency=am, trajectory=path, duration=duration)
     return MovingPressure(tacton=tacton, **{"peak_pressure": 1.0} | load)

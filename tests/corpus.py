@@ -41,6 +41,32 @@ size_y_mm = 60
 points_mm = [[0, 0], [10, 0]]
 """
 
+SHORT = """
+name = "short"
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.05
+[body]
+size_x_mm = 60
+size_y_mm = 60
+[probes]
+points_mm = [[0, 0], [5, 0]]
+"""
+FREE = """
+[tacton]
+am_frequency_hz = 226
+duration_s = 0.09
+[body]
+size_x_mm = 29.3
+size_y_mm = 20
+thickness_mm = 9.9
+base = "free"
+sides = "clamped"
+material = {density_kg_m3 = 1000, shear_modulus_pa = 30100, poisson = 0.4999, viscosity_pa_s = 4.3}
+[probes]
+points_mm = [[-5.3, 8.7], [-0.5, -1.1], [-7.7, -1.3]]
+"""
+
 NUMBERS = {
     "tacton": ("amplitude_percent", "am_frequency_hz", "second_am_frequency_hz",
                "envelope_frequency_hz", "duration_s", "size_mm", "speed_m_per_s"),
@@ -91,6 +117,7 @@ ABSURD = {
         "kind = 'sheet'\n", "size_x_mm = 2e3\nsize_y_mm = 10.1", "--element-size", "0.1",
     ),
 }  # fmt: skip
+CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]
 
 
 def scenes() -> dict[str, dict[str, bytes]]:
@@ -120,6 +147,7 @@ def scenes() -> dict[str, dict[str, bytes]]:
     junk = {f"junk {n}": rng.randbytes(n) for n in (8, 100, 5000)}
     junk |= {code: GOOD.encode(code) for code in ("utf-16", "utf-16-be")}
     junk["latin-1"] = GOOD.replace("small", "schön").encode("latin-1")
+    junk["a picture"] = b"\x89PNG\r\n\x1a\n" + bytes(20)
     junk["a zero byte"] = GOOD.encode().replace(b"small", b"sm\0all")
     junk["larger than any scene"] = b"# " + b"x" * 32_000_000
     return found | {"junk": junk}
@@ -142,18 +170,17 @@ def command_lines() -> list[list[str]]:
     """Arguments that are refused in one sentence, beside good.toml, none.toml and kept/note."""
     run, compare, plan = ["run", "good.toml"], ["compare", "good.toml"], ["plan", "good.toml"]
     fem_run = [*run, "--model", "fem"]
-    found = [
-        [*c, "--element-size", h] for c in (run, compare, plan) for h in ("nan", "0", "1e-9", "31")
-    ]
+    sizes = ("nan", "0", "1e-9", "31", "-1")
+    found = [[*c, "--element-size", h] for c in (run, compare, plan) for h in sizes]
     found += [[*c, "--tolerance", t] for c in (fem_run, plan) for t in ("0", "1", "nan", "1e400")]
     found += [
         [*c, "--model", "fem-transient", "--element-size", "5", "--dt", dt]
         for c in (run, plan)
-        for dt in ("0", "nan", "1e300", "1e-12")
+        for dt in ("0", "nan", "1e300", "1e-12", "-1")
     ]
     found += [[*c, "--solver", "nonsense"] for c in (run, compare)]
     outs = ("kept", "kept/note/below", "good.toml", ".", "", "x\0y", "loop")
-    found += [[*run, "--out", out] for out in outs]
+    found += [[*run, "--out", out] for out in outs] + [[*compare, "--out", "kept"]]
     found += [[*run, "--overwrite", "--out", out] for out in ("kept/note", ".", "", "/", "loop")]
     files = ("missing.toml", "kept", "", "x\0y", "n" * 300, "good.toml/x", "/dev/zero")
     found += [["plan", f] for f in files]
@@ -167,9 +194,6 @@ def wrong_usage() -> list[list[str]]:
     found += [[*run, "--model", m] for m in ("magic", "")]
     found += [[*run, "--element-size", h] for h in ("abc", "1,5", "--quiet")]
     return [*found, [*run, "--out"], ["plan", "good.toml", "--out", "x"], ["convert", "good.toml"]]
-
-
-CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]
 
 
 def broken_meshes() -> dict[str, Callable[[], object]]:

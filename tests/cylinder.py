@@ -22,7 +22,6 @@ def check(body: Body) -> None:
 
 
 def disc(body: Body, h: float) -> TetMesh:
-    """Rings of triangles around the axis, in layers downwards."""
     rings = max(2, round(body.width / 2 / h))
     radii = np.repeat(np.arange(rings + 1), [1, *(6 * np.arange(1, rings + 1))]) / rings
     turns = np.concatenate([[0.0], *(np.arange(6 * k) / (6 * k) for k in range(1, rings + 1))])

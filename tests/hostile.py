@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import tomli_w
+from pattern_files import adaptics, keyframe
 from scipy.io import wavfile
 
-from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
 from skinwave.sweeps import dataset
 
 SEED = 1907
@@ -38,6 +38,8 @@ VALUES = (
     None, True, "", "x", "\x1b[2J", "\u202e", "../../x", [], {}, [[]], [None], {"a": {}}, -1, 0,
     1e308, -1e308, 5e-324, float("nan"), float("inf"), 10**400, 2**63, ["a"], [1e308, -1e308], DEEP,
 )  # fmt: skip
+PATTERN = adaptics(keyframe(0.0), keyframe(50.0, (5.0, 0.0)))
+RUN = ("run", "FILE", "--model", "point-kernel", "--quiet")
 
 
 def changed(table: object, rng: random.Random) -> object:
@@ -65,7 +67,6 @@ def _places(node: object):
 
 
 def file(name: str, content: bytes | str, *arguments: str) -> Write:
-    """A command on one file, "FILE" among its arguments."""
 
     def write(folder: Path) -> list[str]:
         raw = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
@@ -75,11 +76,7 @@ def file(name: str, content: bytes | str, *arguments: str) -> Write:
     return write
 
 
-RUN = ("run", "FILE", "--model", "point-kernel", "--quiet")
-
-
 def scenes() -> dict[str, Write]:
-    """Scenes, some of which are still computed."""
     rng, good = random.Random(SEED), tomli_w.dumps(QUICK)
     texts = {
         "keys by the hundred thousand": "\n".join(f"k{k} = 1" for k in range(120_000)),
@@ -125,36 +122,6 @@ def _dumped(table: object) -> str:
         return "x = " + "[" * 500 + "]" * 500
 
 
-def _adaptics() -> dict:
-    def f64(value: float) -> dict:
-        return {"type": "f64", "value": value}
-
-    linear = {"name": "linear", "params": {}}
-    params = {"radius": f64(10.0), "am_freq": f64(120.0), "stm_freq": f64(80.0)}
-    constant = {"name": "constant", "params": {"value": f64(1.0)}}
-    frames = [
-        {
-            "time": time, "type": "standard", "cjumps": [],
-            "brush": {"brush": {"name": "circle", "params": params}, "transition": linear},
-            "intensity": {"intensity": constant, "transition": linear},
-            "coords": {"coords": {"x": time / 10, "y": 0.0, "z": 0.0}, "transition": linear},
-        }
-        for time in (0.0, 50.0)
-    ]  # fmt: skip
-    one = f64(1.0)
-    transform = {
-        "geometric_transforms": {
-            "translate": {"x": f64(0.0), "y": f64(0.0), "z": f64(200.0)}, "rotation": f64(0.0),
-            "scale": {"x": one, "y": one, "z": one},
-        },
-        "intensity_factor": one, "playback_speed": one,
-    }  # fmt: skip
-    return {
-        "$DATA_FORMAT": FORMAT, "$REVISION": REVISIONS[-1], "name": "pattern", "keyframes": frames,
-        "pattern_transform": transform, "user_parameter_definitions": {"p": {"default": 1.0}},
-    }  # fmt: skip
-
-
 def _wav(change: Callable[[bytearray], None] = lambda raw: None) -> bytes:
     stream = io.BytesIO()
     wavfile.write(stream, 1000, np.sin(np.arange(100)).astype(np.float32))
@@ -168,7 +135,6 @@ def _put(at: int, form: str, value: int) -> Callable[[bytearray], None]:
 
 
 def patterns() -> dict[str, Write]:
-    """Patterns of every kind, some of which are still converted."""
     rng = random.Random(SEED)
     found = {}
 
@@ -178,12 +144,12 @@ def patterns() -> dict[str, Write]:
         found[f"pattern, {name}"] = file(f"in{suffix}", content, *arguments, *more)
 
     for name in ("\x1b[2J", "../../x", None):
-        text = json.dumps(_adaptics() | {"name": name})
+        text = json.dumps(PATTERN | {"name": name})
         add(f"named {str(name)[:8]!a}", ".adaptics", text)
     for k in range(5):
-        add(f"changed {k}", ".adaptics", json.dumps(changed(_adaptics(), rng)))
+        add(f"changed {k}", ".adaptics", json.dumps(changed(PATTERN, rng)))
     add("JSON nested deeply", ".adaptics", '{"a":' * 100_000)
-    unhashable = json.dumps(_adaptics()).replace('"circle"', '["circle"]')
+    unhashable = json.dumps(PATTERN).replace('"circle"', '["circle"]')
     add("a brush that is a list", ".adaptics", unhashable)
     lies = {
         "RIFF of 4 GB": _put(4, "<I", 2**32 - 1),
@@ -207,7 +173,6 @@ def patterns() -> dict[str, Write]:
 
 
 def special_files() -> dict[str, Write]:
-    """Pipes, folders, devices and sparse files in the place of each kind of file."""
     commands = {
         "scene": ("x.toml", *RUN), "WAV": ("x.wav", "convert", "FILE", "o.toml"),
         "surface": ("x.stl", "mesh", "FILE", "--quiet"),
@@ -247,7 +212,6 @@ def meshes() -> dict[str, Write]:
 
 
 def _answered(folder: Path) -> Path:
-    """A folder of a result, made once by the command itself."""
     scene = folder / "scene.toml"
     scene.write_text(tomli_w.dumps(QUICK))
     command = [sys.executable, "-m", "skinwave", *RUN, "--out", "result"]
@@ -303,7 +267,6 @@ def results(made: Path) -> dict[str, Write]:
 
 
 def tables() -> dict[str, Write]:
-    """Folders of sweeps that no sweep has written."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -344,7 +307,6 @@ def tables() -> dict[str, Write]:
 
 
 def requests() -> dict[str, Write]:
-    """Arguments of commands, on a good scene."""
     asked = [
         ["sweep", "FILE", "--vary", vary]
         for vary in (

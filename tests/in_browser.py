@@ -24,7 +24,6 @@ needs_browser = pytest.mark.skipif(
 
 @contextmanager
 def chromium() -> Iterator[Any]:
-    """A browser of Playwright."""
     playwright = pytest.importorskip("playwright.sync_api")
     wait = playwright.Page.wait_for_function
     # By default it checks in every frame, which makes the browser draw 60 frames a second.
@@ -37,7 +36,6 @@ def chromium() -> Iterator[Any]:
 
 
 def frames(page: Any, count: int) -> None:
-    """Wait until a page has drawn `count` frames."""
     page.evaluate(
         "count => new Promise(done => { const next = () => count-- ? requestAnimationFrame(next)"
         " : done(); next() })",
@@ -69,7 +67,6 @@ def start_server(*arguments: str) -> tuple[Any, str]:
 
 
 def end_server(process: Any) -> None:
-    """End a server, which must not have printed a traceback."""
     process.terminate()
     printed = process.communicate(timeout=600)[1]
     assert "Traceback" not in printed, printed

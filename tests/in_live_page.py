@@ -36,9 +36,7 @@ SHAPES = ("point", "line", "circle", "triangle", "square")
 
 
 def modules(browser, folder):
-    """A page with a map and a view. Its window has the functions of modules, and `attempt`, which
-    returns errors as `refused`.
-    """
+    """A page with a map and a view, whose window has the functions of modules."""
     shutil.copytree(str(resources.files("skinwave") / "static"), folder)
     (folder / "entry.js").write_text(MODULE, encoding="utf-8")
     text = f"{PAGE}{bundle(folder, 'entry.js')}</script>"
@@ -50,7 +48,6 @@ def modules(browser, folder):
 
 
 def some_values(starts, count, *, rhythm):
-    """Random values of the controls, the same every time."""
     rng = random.Random(3)
     return [starts | _values(rng, rhythm) for _ in range(count)]
 

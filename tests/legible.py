@@ -44,5 +44,4 @@ def illegible(figure):
 
 
 def sizes(figure):
-    """Sizes in points of its letters."""
     return {text.get_fontsize() for text, _ in texts(figure)}

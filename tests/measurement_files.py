@@ -67,7 +67,6 @@ def matlab_73(path: Path) -> None:
 
 
 def wav_16(path: Path) -> None:
-    """Two channels of 16 bits by the standard library."""
     with wave.open(str(path), "wb") as file:
         file.setparams((2, 2, int(RATE), 0, "NONE", ""))
         file.writeframes(samples_16().tobytes())
@@ -81,17 +80,25 @@ def wav_float(path: Path) -> None:
     wavfile.write(path, int(RATE), MM_S[0].astype(np.float32))
 
 
+def uff_nodes(x: np.ndarray, y: np.ndarray) -> dict:
+    node = np.arange(1, len(x) + 1)
+    return pyuff.prepare_2411(node_nums=node, def_cs=0 * node, disp_cs=0 * node, color=0 * node,
+                              x=x, y=y, z=0 * x)  # fmt: skip
+
+
+def write_uff(path: Path, sets: list) -> Path:
+    path.unlink(missing_ok=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # pyuff does not close binary files
+        pyuff.UFF(str(path)).write_sets(sets, "add")
+    return path
+
+
 def universal(path: Path, *, binary: int = 0, complex_: bool = False, **changes: object) -> None:
     """Nodes in mm, both repetitions of each, along z."""
-    path.unlink(missing_ok=True)
-    file = pyuff.UFF(str(path))
-    node = np.arange(1, 4)
-    sets = [
-        pyuff.prepare_164(units_code=5, units_description="mm (milli-newton)", temp_mode=1,
-                          length=1e3, force=1e3, temp=1.0, temp_offset=0.0),
-        pyuff.prepare_2411(node_nums=node, def_cs=0 * node, disp_cs=0 * node, color=0 * node,
-                           x=PLACES_MM[:, 0], y=PLACES_MM[:, 1], z=np.zeros(3)),
-    ]  # fmt: skip
+    units = pyuff.prepare_164(units_code=5, units_description="mm (milli-newton)", temp_mode=1,
+                              length=1e3, force=1e3, temp=1.0, temp_offset=0.0)  # fmt: skip
+    sets = [units, uff_nodes(*PLACES_MM.T)]
     values, axis = (UM, F) if complex_ else (MM_S, T)
     for run in values:
         for p in range(3):
@@ -105,9 +112,7 @@ def universal(path: Path, *, binary: int = 0, complex_: bool = False, **changes:
                 "ordinate_axis_units_lab": "um" if complex_ else "mm/s",
             } | changes  # fmt: skip
             sets.append(pyuff.prepare_58(**kept))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResourceWarning)  # pyuff does not close binary files
-        file.write_sets(sets, "add")
+    write_uff(path, sets)
 
 
 def skinsource(path: Path, seed: int = 5) -> np.ndarray:

@@ -59,8 +59,7 @@ def disc(tmp_path, monkeypatch):
 
 def test_a_scene_of_a_new_kind_is_read_and_written(disc):
     assert disc.body == BODIES["silicone-cylinder"]
-    assert disc.body.width == 0.08
-    assert disc.body.depth == 0.02
+    assert (disc.body.width, disc.body.depth) == (0.08, 0.02)
     assert loads(dumps(disc)) == disc
     with pytest.raises(ValueError, match="one diameter"):
         loads(SCENE.replace('kind = "cylinder"', 'kind = "cylinder"\nsize_x_mm = 60'))
@@ -69,7 +68,6 @@ def test_a_scene_of_a_new_kind_is_read_and_written(disc):
 
 
 def test_a_soft_cylinder_deflects_as_its_slab_in_the_middle(disc):
-    """At a low frequency, far from its rim: within the difference of their meshes."""
     still = replace(disc.tacton, am_frequency=20.0, trajectory=type(disc.tacton.trajectory)())
     scene = replace(disc, pressure=replace(disc.pressure, tacton=still), probes=((0.0, 0.0),))
     own = skinwave.simulate(scene, "fem", 0.5, h=5e-3).displacement
@@ -89,11 +87,8 @@ def test_a_new_kind_runs(disc, capsys):
 @pytest.mark.slow
 def test_a_new_kind_is_compared_and_swept_in_other_processes(disc):
     assert main(["compare", "disc.toml", *MESH, "--out", "compared"]) == 0
-    assert {row["body"] for row in read_results.rows("compared/lines.csv")} == {
-        "none",
-        "silicone-cylinder",
-    }
-    assert "cylinder of 80 \u00d7 20 mm" in Path("compared/index.html").read_text()
+    rows = read_results.rows("compared/lines.csv")
+    assert {row["body"] for row in rows} == {"none", "silicone-cylinder"}
     vary = ["--vary", "tacton.am_frequency_hz=80,120", "--model", "fem", "--out", "swept"]
     assert main(["sweep", "disc.toml", *vary, "--workers", "2", *MESH, "--json"]) == 0
 
@@ -104,25 +99,18 @@ def test_a_new_model_runs(disc, capsys, static_deflection):
         found = skinwave.simulate(disc, "static-deflection")
     assert found.model == "static-deflection"
     pressure = disc.pressure(disc.probe_points, found.times[7])
-    assert found.displacement[7] == pytest.approx(
-        static_deflection.per_pressure(disc.body) * pressure
-    )
+    expected = static_deflection.per_pressure(disc.body) * pressure
+    assert found.displacement[7] == pytest.approx(expected)
     assert np.isnan(found.expected_error)
     words = ["run", "disc.toml", "--model", "static-deflection", "--out", "out", "--quiet"]
     assert main(words) == 0
     assert {row["model"] for row in read_results.rows("out/lines.csv")} == {"static-deflection"}
     assert said in capsys.readouterr().err
-    assert said in Path("out/index.html").read_text()
     assert main(["plan", "disc.toml", "--model", "static-deflection"]) == 0
-    planned = capsys.readouterr()
-    assert static_deflection.STATIC.method in planned.out
-    assert said in planned.err
+    assert said in capsys.readouterr().err
     assert main(["sweep", "disc.toml", "--vary", "tacton.am_frequency_hz=80,120", *words[2:4],
                  "--out", "swept", "--quiet", "--scheduler", "threads"]) == 0  # fmt: skip
     assert all(said in row["warnings"] for row in dataset.read(Path("swept")))
-    with pytest.raises(SystemExit):
-        main(["run", "disc.toml", "--model", "no-model"])
-    assert "static-deflection" in capsys.readouterr().err
 
 
 def test_a_new_model_refuses_a_body(disc):

@@ -5,6 +5,7 @@ import os
 import re
 import sys
 from argparse import Namespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -22,9 +23,7 @@ def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
     assert main(["run", str(scene), "--out", "first", *fem, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["model"] == "fem"
     assert main(["run", "first/scene.toml", "--out", "second", *fem, "--quiet"]) == 0
-    first, second = (
-        read_results.arrays(f"{folder}/responses.npz") for folder in ("first", "second")
-    )
+    first, second = (read_results.arrays(f"{name}/responses.npz") for name in ("first", "second"))
     assert first["displacement"].shape == (500, 2)
     np.testing.assert_array_equal(first["fem"], first["displacement"])
     np.testing.assert_allclose(first["displacement"], second["displacement"], rtol=1e-9)
@@ -47,9 +46,7 @@ def test_run_with_each_model(scene, model):
 
 @pytest.mark.usefixtures("in_one_process")
 def test_compare_a_scene_of_ones_own(scene, capsys):
-    scene.write_text(
-        CLAMPED.replace("duration_s = 0.05", "duration_s = 0.3")
-    )  # to tell lines apart
+    scene.write_text(CLAMPED.replace("0.05", "0.3"))  # to tell lines apart
     assert main(["compare", str(scene), "--element-size", "6", "--out", "both"]) == 0
     assert "3 of 3 runs" in capsys.readouterr().out
     folder = scene.parent / "both"
@@ -73,24 +70,13 @@ def test_compare_a_scene_of_ones_own(scene, capsys):
 
 def test_plan_gives_a_reason_for_every_row(scene, capsys):
     assert main(["plan", str(scene), "--tolerance", "0.02"]) == 0
-    printed = capsys.readouterr().out
-    assert "flat-body" in printed
-    assert "highest line" in printed
+    assert "flat-body" in capsys.readouterr().out
     scene.write_text(GOOD)  # its sides are clamped
     assert main(["plan", str(scene), "--json"]) == 0
     required = json.loads(capsys.readouterr().out)
     assert required["model"] == "fem"
     assert 0.001 < required["h"] < 0.008
     assert all(row["reason"] for row in required["rows"])
-
-
-def refused(capsys, *arguments):
-    """The one sentence with which a call is refused."""
-    assert main([str(argument) for argument in arguments]) == 2
-    captured = capsys.readouterr()
-    assert captured.err.count("\n") == 1
-    assert "Traceback" not in captured.err
-    return captured.err
 
 
 def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_path, capsys):
@@ -108,60 +94,6 @@ def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_pa
     with pytest.raises(SystemExit):
         main(["run", "--help"])
     assert "SKINWAVE_CACHE" in capsys.readouterr().out
-
-
-def test_existing_folders_are_not_replaced(scene, capsys):
-    (scene.parent / "kept").mkdir()
-    (scene.parent / "kept/note.txt").write_text("mine")
-    assert "--overwrite" in refused(capsys, "run", scene, "--out", "kept")
-    assert "--overwrite" in refused(capsys, "compare", scene, "--out", "kept")
-    assert (scene.parent / "kept/note.txt").read_text() == "mine"
-
-
-def test_overwriting_replaces_only_when_all_is_written(scene, capsys):
-    arguments = ["run", scene, "--out", "kept", "--overwrite"]
-    known = ["--model", "point-kernel", "--quiet"]
-    assert main([*map(str, arguments), *known]) == 0
-    capsys.readouterr()
-    before = (scene.parent / "kept/record.json").stat()
-
-    def written():  # not when it was read
-        now = (scene.parent / "kept/record.json").stat()
-        return now.st_ino, now.st_mtime_ns, now.st_size
-
-    as_before = written()
-    assert "solver 'nonsense' is unknown" in refused(capsys, *arguments, "--solver", "nonsense")
-    assert written() == as_before
-    assert main([*map(str, arguments), *known]) == 0
-    assert (scene.parent / "kept/record.json").stat().st_ino != before.st_ino
-    assert (scene.parent / "kept/index.html").exists()
-    assert sorted(p.name for p in scene.parent.iterdir()) == ["kept", "short.toml"]
-
-
-def test_bad_input_is_one_sentence(scene, capsys):
-    assert "cannot be read" in refused(capsys, "run", "missing.toml")
-    scene.write_text("[tacton\n")
-    assert "not valid TOML" in refused(capsys, "run", scene)
-    scene.write_bytes(b"\xff\xfe\x00")
-    assert "short.toml" in refused(capsys, "run", scene)
-    scene.write_text(SMALL)
-    assert "element size -1 mm must" in refused(capsys, "run", scene, "--element-size", "-1")
-    assert "time step -1 s" in refused(
-        capsys, "run", scene, "--element-size", "15", "--model", "fem-transient", "--dt", "-1"
-    )
-    assert not (scene.parent / "short-out").exists()
-
-
-def test_unwritable_folders_are_refused(scene, capsys):
-    (scene.parent / "file").write_text("")
-    assert "is a file" in refused(capsys, "run", scene, "--out", "file", "--overwrite")
-    assert "written" in refused(capsys, "run", scene, "--out", "file/below")
-
-
-def test_wrong_options_exit_with_two(capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["run", "x.toml", "--model", "magic"])
-    assert stop.value.code == 2
 
 
 @pytest.mark.parametrize("terminal", [False, True])
@@ -185,8 +117,8 @@ def test_progress_shows_the_step_and_the_time(capsys, monkeypatch, terminal):
 
 @pytest.mark.usefixtures("in_one_process")
 def test_an_interrupt_keeps_finished_runs(scene, monkeypatch, capsys):
-    """Both kernels are finished before the body is reduced."""
     scene.write_text(CLAMPED)
+    interrupted = Mock(side_effect=KeyboardInterrupt)
     monkeypatch.setattr("skinwave.studies.study.prepare", interrupted)
     assert main(["compare", str(scene), "--element-size", "8", "--out", "cut", "--quiet"]) == 1
     page = (scene.parent / "cut/index.html").read_text()
@@ -196,28 +128,7 @@ def test_an_interrupt_keeps_finished_runs(scene, monkeypatch, capsys):
     assert sorted(path.name for path in scene.parent.iterdir()) == ["cut", "short.toml"]
 
 
-def interrupted(*given, **options):
-    raise KeyboardInterrupt
-
-
-def test_warnings_are_printed_once_and_on_the_page(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "scene.toml").write_text(
-        "[tacton]\nam_frequency_hz = 140\nduration_s = 0.02\n"
-        '[body]\nsize_x_mm = 30\nsize_y_mm = 30\nsides = "free"\n[probes]\npoints_mm = [[0, 0]]\n'
-    )
-    for model, cause in (
-        ("fem", "elements of 15 mm: expected error"),
-        ("flat-body", "reflections from the sides, which flat-body leaves out"),
-    ):
-        words = f"run scene.toml --model {model} --element-size 15 --quiet --overwrite"
-        assert main(words.split()) == 0
-        assert capsys.readouterr().err.count(f"warning: {cause}") == 1
-        assert f"Take care: {cause}" in (tmp_path / "scene-out/index.html").read_text()
-
-
 def test_an_error_above_the_tolerance_is_a_warning(tmp_path, capsys, monkeypatch):
-    """The sequence of meshes of the plan ends too early."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.0)
     (tmp_path / "scene.toml").write_text(
@@ -226,7 +137,5 @@ def test_an_error_above_the_tolerance_is_a_warning(tmp_path, capsys, monkeypatch
         'thickness_mm = 0.1\nbase = "free"\nsides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n'
     )
     assert main(["run", "scene.toml", "--model", "fem", "--tolerance", "0.001", "--quiet"]) == 0
-    said = capsys.readouterr().err
-    assert "warning: elements of" in said
-    assert "tolerance 0.1 %" in said
+    assert "warning: elements of" in capsys.readouterr().err
     assert "Take care: elements of" in (tmp_path / "scene-out/index.html").read_text()

@@ -71,19 +71,6 @@ def test_projection_is_exact_for_linear_dilatation(distorted_cube):
     assert found @ found < 0.6 * (rough @ direct @ rough)
 
 
-def test_macroelements_of_a_box_mesh_are_the_boxes():
-    mesh = meshes.block((3.0, 2.0, 1.0), 0.5)
-    cluster, sloping = macroelements(mesh)
-    assert sloping.all()
-    np.testing.assert_array_equal(np.bincount(cluster), 6)
-    centres = mesh.points[mesh.tets[:, :4]].mean(axis=1)
-    lowest, highest = (
-        np.array([side(centres[cluster == c], axis=0) for c in range(len(sloping))])
-        for side in (np.min, np.max)
-    )
-    assert (highest - lowest).max() < 0.5
-
-
 def test_element_without_inner_edges_is_its_own_macroelement():
     points = np.vstack([np.zeros(3), np.eye(3)])
     mesh = meshes.quadratic(TetMesh(points=points, tets=[[0, 1, 2, 3]]))
@@ -138,12 +125,8 @@ def test_operators_equal_their_defining_integrals(distorted_cube, bend, fixed):
 
 def test_regions_have_their_own_material():
     mesh = meshes.block((0.02, 0.02, 0.02), 0.005)
-    half = TetMesh(
-        points=mesh.points,
-        tets=mesh.tets,
-        region=(mesh.points[mesh.tets].mean(axis=1)[:, 2] < -0.01).astype(int),
-        facets=mesh.facets,
-    )
+    below = mesh.points[mesh.tets].mean(axis=1)[:, 2] < -0.01
+    half = replace(mesh, region=below.astype(int))
     soft = fem.Material(density=1000, shear_modulus=1e4, poisson=0.45, viscosity=2)
     stiff = fem.Material(density=1200, shear_modulus=1e6, poisson=0.45, viscosity=3)
     one, two = fem.assemble(mesh, soft), fem.assemble(half, {0: soft, 1: soft})

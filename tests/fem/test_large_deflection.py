@@ -18,13 +18,9 @@ from skinwave.scene.scene import BODIES, Body, Placement, Scene
 from skinwave.verify.references import elastica
 
 PAPER = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06)
-CIRCLING = MovingPressure(
-    tacton=Tacton(
-        am_frequency=140, duration=0.02, trajectory=Trajectory(shape="circle", size=0.02, speed=12)
-    ),
-    drive="pressure_squared",
-)
-SCENE = Scene(pressure=CIRCLING, body=PAPER, probes=((0.0, 0.0), (0.01, 0.005)))
+CIRCLE = Trajectory(shape="circle", size=0.02, speed=12)
+LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.02, trajectory=CIRCLE))
+SCENE = Scene(pressure=LOAD, body=PAPER, probes=((0.0, 0.0), (0.01, 0.005)))
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +35,8 @@ def test_membrane_adds_the_missing_stretching_stiffness(sheet):
     stretched = np.zeros_like(x)
     stretched[:, :2] = 1e-4 * x[:, :2]
     stretched[:, 2] = -2 * 0.3 / 0.7 * 1e-4 * (x[:, 2] - x[:, 2].mean())
-    free = fem.finite_strain(
-        made.mesh, made.material, fixed=np.zeros(x.shape, bool), membrane=membrane(PAPER, made)
-    )
+    given = {"fixed": np.zeros(x.shape, bool), "membrane": membrane(PAPER, made)}
+    free = fem.finite_strain(made.mesh, made.material, **given)
     solid = PAPER.solid
     relaxed = (solid.complex_modulus(0.0) / solid.shear_modulus).real
     area = PAPER.width * PAPER.height
@@ -59,7 +54,6 @@ def test_motion_starts_from_rest():
 
 
 def test_small_deflection_matches_a_linear_plate():
-    """Under very little pressure, by Ritz's modes of a thin plate, with the mean deflection."""
     lossy = from_young(density=800, young=8e8, poisson=0.3, viscosity=1.2e4)
     mounting = Mounting(edges=("front",))
     body = replace(PAPER, width=0.03, height=0.03, depth=2.5e-4, material=lossy, mounting=mounting)
@@ -114,7 +108,6 @@ def thin_strip(cells):
 
 @pytest.mark.parametrize("load", [10.0, 0.02])
 def test_thin_strip_bends_like_the_elastica(load):
-    """Converges also at a small load, where the residual is round-off."""
     body, share, stiffness = thin_strip(40)
     u = nonlinear.static(body, load * stiffness * share.ravel()).reshape(-1, 3)
     tip = u[share[:, 2] != 0].mean(axis=0)
@@ -136,11 +129,10 @@ def test_invalid_bodies_are_refused():
         fem.finite_strain(mesh, fem.Material(density=1, shear_modulus=1, poisson=0.49))
     with pytest.raises(meshes.MeshError, match="order 2"):
         meshes.middle_plane(meshes.block((0.02, 0.02, 0.01), 0.01, order=1))
-    layer = fem.Membrane(
-        triangles=mesh.facets["left"], thickness=1e-3, material=fem.PRESETS["paper"]
-    )
+    paper = fem.PRESETS["paper"]
+    layer = fem.Membrane(triangles=mesh.facets["left"], thickness=1e-3, material=paper)
     with pytest.raises(meshes.MeshError, match="one horizontal plane"):
-        fem.finite_strain(mesh, fem.PRESETS["paper"], membrane=layer)
+        fem.finite_strain(mesh, paper, membrane=layer)
 
 
 def test_nonlinear_models_need_a_clamped_level_sheet():
@@ -151,7 +143,6 @@ def test_nonlinear_models_need_a_clamped_level_sheet():
 
 
 def test_lifted_sheet_gets_the_axial_pressure_of_the_focus():
-    """Under very little pressure, where the response is linear."""
     still = Tacton(am_frequency=140, duration=0.02)
     scene = replace(SCENE, pressure=MovingPressure(tacton=still, peak_pressure=1e-3))
     lifted = replace(scene, body=replace(scene.body, placement=Placement(lift=0.02)))

@@ -13,15 +13,14 @@ import numpy as np
 import pytest
 from scipy import sparse
 from scipy.signal import lfilter
+from scipy.sparse.linalg import eigsh
 
 import fem
 import meshes
 import skinwave
 from fem import linear_solver, memory, pardiso
 from fem.harmonic import dynamic_stiffness
-from fem.krylov import load_subspace
 from fem.reduced import exponential_sum, line_response
-from fem.sparsity import on_one_pattern
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.models.meshed import energy_balance
 from skinwave.planning.simulate import compute
@@ -37,7 +36,6 @@ def solves(x, A, b):
 
 @pytest.fixture(scope="module")
 def stiff():
-    """A small dynamic stiffness and right-hand sides."""
     mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
     ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
     A = ops.K + 1e3 * ops.C + 1e6 * ops.M
@@ -95,7 +93,6 @@ def test_body_larger_than_memory_is_refused(monkeypatch):
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_line_solver_solves_successive_frequencies(stiff, backend):
-    """With and without known combinations, also after pickling between frequencies."""
     b = stiff[2]
     terms = (fem.PronyTerm(modulus=5e3, time=1e-3), fem.PronyTerm(modulus=9e3, time=1e-4))
     mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
@@ -123,7 +120,6 @@ def test_single_precision_factor_is_refined_or_replaced(stiff, monkeypatch, slow
 
 
 def test_lines_of_a_thin_sheet_match_double_precision():
-    """Round-off of single precision exceeds its bending stiffness."""
     mesh = meshes.sheet(0.1, 0.1, 1e-4, 0.005)
     ops = fem.assemble(mesh, fem.PRESETS["paper"], fixed="sides")
     force = fem.load_operator(mesh) @ np.ones(len(fem.facet_points(mesh)))
@@ -133,16 +129,6 @@ def test_lines_of_a_thin_sheet_match_double_precision():
         A = dynamic_stiffness(ops.K, ops.C, ops.M, ops.branches, s)
         exact = S[:, ops.free] @ fem.factorise(A).solve(force[ops.free].astype(complex))
         np.testing.assert_allclose(S @ fem.harmonic(ops, force, hertz)[0], exact, rtol=1e-3)
-
-
-def test_different_patterns_are_united():
-    rng = np.random.default_rng(3)
-    full = [sparse.random_array((9, 9), density=0.2, rng=rng, format="csr") for _ in range(3)]
-    matrices = [(A + A.T).tocsr() for A in full]
-    values, columns, starts = on_one_pattern(matrices)
-    for A, each in zip(matrices, values, strict=True):
-        found = sparse.csr_array((each, columns, starts), shape=A.shape)
-        np.testing.assert_array_equal(found.toarray(), np.triu(A.toarray()))
 
 
 def test_superlu_works_without_mkl_and_metis(stiff, monkeypatch):
@@ -168,9 +154,8 @@ def body(kind, h=0.1 / 24):
         mesh = meshes.block((0.06, 0.06, 0.015), h, grading=meshes.Grading(radius=0.02, growth=1.2))
         return mesh, fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
     mesh = meshes.sheet(0.1, 0.1, 1e-3, h)
-    return mesh, fem.assemble(
-        mesh, fem.from_young(density=80, young=4e6, poisson=0.3, loss_factor=0.03)
-    )
+    light = fem.from_young(density=80, young=4e6, poisson=0.3, loss_factor=0.03)
+    return mesh, fem.assemble(mesh, light)
 
 
 def misfit(candidate, reference):
@@ -179,7 +164,6 @@ def misfit(candidate, reference):
 
 @pytest.mark.parametrize(("kind", "h"), [("skin", 0.01), ("sheet", 0.0125)])
 def test_error_estimate_is_near_the_true_error(kind, h):
-    """Also for a sheet with little loss, where moments converge faster and faster."""
     mesh, ops = body(kind, h)
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
     S = fem.probe_operator(mesh, PROBES)
@@ -196,7 +180,6 @@ def test_error_estimate_is_near_the_true_error(kind, h):
 
 
 def test_basis_of_all_dofs_gives_the_full_model():
-    """Further moments are round-off and must not be added."""
     mesh = meshes.block((0.06, 0.06, 0.015), 0.06)
     ops = fem.assemble(mesh, replace(fem.PRESETS["palm"], viscosity=0.0))
     S = fem.probe_operator(mesh, np.column_stack([np.linspace(0, 0.02, 40)] * 2))
@@ -205,16 +188,14 @@ def test_basis_of_all_dofs_gives_the_full_model():
         model = fem.reduce(ops, probes, 1000.0, tolerance, loads=F)
         assert len(model.operators.K) <= len(ops.free)
         basis = model.basis[ops.free]
-        np.testing.assert_allclose(
-            basis.T @ (ops.M @ basis), np.eye(len(model.operators.K)), atol=1e-9
-        )
+        mass = basis.T @ (ops.M @ basis)
+        np.testing.assert_allclose(mass, np.eye(len(mass)), atol=1e-9)
         found = fem.transfer(model, model.basis.T @ F, [100.0, 700.0])
         exact = np.array([probes @ fem.harmonic(ops, F, f)[0] for f in (100.0, 700.0)])
         assert np.linalg.norm(found - exact) < max(1e-9, 4 * model.estimate) * np.linalg.norm(exact)
 
 
 def test_dependent_probes_in_one_element():
-    """Forty-one probes, two of them at one point."""
     mesh = meshes.block((0.03, 0.03, 0.01), 0.008)
     ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
     places = np.column_stack([np.linspace(0, 0.01, 41), np.zeros(41)])
@@ -226,23 +207,6 @@ def test_dependent_probes_in_one_element():
     exact = S @ fem.harmonic(ops, F, 140.0)[0]
     assert np.linalg.norm(found - exact) < 2e-3 * np.linalg.norm(exact)
     np.testing.assert_array_equal(found[0], found[1])
-
-
-def test_poles_give_the_transfer_function(stiff):
-    ops, _, _ = stiff
-    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
-    S = fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.001]])
-    model = fem.reduce(ops, S, 500.0, 1e-2)
-    assert (np.linalg.eigvalsh(model.operators.K) > 0).all()
-    poles = fem.poles(model.operators, model.outputs)
-    assert (poles.values.real < 0).all()
-    force = np.random.default_rng(0).standard_normal(len(model.operators.K))
-    s = 2j * np.pi * 140.0
-    half = poles.outputs @ (poles.inputs @ force / (s - poles.values))
-    mirrored = poles.outputs.conj() @ (poles.inputs.conj() @ force / (s - poles.values.conj()))
-    np.testing.assert_allclose(
-        half + mirrored, fem.transfer(model, force[:, None], 140.0)[0, :, 0], rtol=1e-8
-    )
 
 
 def integrated(poles, load, dt):
@@ -274,17 +238,6 @@ def test_lines_from_rest_match_an_exponential_integrator():
     # The number of times need not be a multiple of the chunks.
     short = exponential_sum(rates, np.vstack([lines, start]), t[:300])
     np.testing.assert_allclose(short, summed[:300], atol=1e-15)
-
-
-def test_load_subspace_spans_the_loads():
-    centres = np.linspace(-0.01, 0.01, 40)
-    x = np.linspace(-0.03, 0.03, 500)
-    loads = np.exp(-((x[:, None] - centres) ** 2) / 2 / 0.004**2)
-    columns = load_subspace(loads, 1e-3)
-    assert columns.shape[1] < 12
-    np.testing.assert_allclose(columns.T @ columns, np.eye(columns.shape[1]), atol=1e-8)
-    left = loads - columns @ (columns.T @ loads)
-    assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(loads)
 
 
 def test_unreachable_tolerance_is_refused(monkeypatch):
@@ -323,3 +276,31 @@ def test_energy_imbalance_is_refused():
     assert 0.05 < fem.imbalance(spent, stored) < 0.15
     with pytest.raises(fem.Diverged, match="energy balance"):
         energy_balance(spent, stored)
+
+
+def sheet(thickness, fixed, h=21e-3):
+    mesh = meshes.sheet(0.148, 0.210, thickness, h)
+    fixed = dict.fromkeys(fixed, "xyz") or np.zeros(mesh.points.shape, bool)
+    return fem.assemble(mesh, fem.PRESETS["paper"], fixed=fixed)
+
+
+def test_modes_of_paper_clamped_at_two_edges():
+    operators = sheet(1e-4, ("left", "right"))
+    found, shapes = fem.modes(operators, 6)
+    expected = np.sqrt(eigsh(operators.K, 6, M=operators.M, sigma=0)[0]) / (2 * np.pi)
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+    kept = shapes[operators.free]
+    np.testing.assert_allclose(kept.T @ (operators.M @ kept), np.eye(6), atol=1e-6)
+
+
+@pytest.mark.slow
+def test_bending_frequencies_of_free_paper_scale_with_thickness():
+    thin, thick = (fem.modes(sheet(thickness, ()), 10)[0] for thickness in (1e-4, 1e-3))
+    assert (thin[:6] < 0.2).all()
+    np.testing.assert_allclose(thin[6:], thick[6:] / 10, rtol=0.01)
+
+
+def test_modes_that_do_not_converge_are_refused(monkeypatch):
+    monkeypatch.setattr(sys.modules["fem.static"], "MOST_RESTARTS", 1)
+    with pytest.raises(fem.Diverged, match="constrain it"):
+        fem.modes(sheet(1e-4, ()), 8)

@@ -12,6 +12,7 @@ from fem.stress import materials_at, nodal_strain, solid_parts, strain_operator
 from simple_model.layers.tensors import hooke
 
 POISSON = [0.3, 0.4999]
+FOCI = [(a * 5e-3, b * 5e-3) for a in (1, -1) for b in (1, -1)]
 
 
 def solid(poisson):
@@ -19,7 +20,6 @@ def solid(poisson):
 
 
 def stress_at(mesh, materials, points, u):
-    """Stress (p, 6) at points, by Hooke's law of the material of each."""
     strain = (strain_operator(mesh, materials, points) @ u).reshape(-1, 6)
     solids = materials_at(mesh, materials, points)
     return np.array([hooke(m) @ e for m, e in zip(solids, strain, strict=True)])
@@ -31,7 +31,6 @@ def tensor(matrix):
 
 @pytest.mark.parametrize("poisson", POISSON)
 def test_linear_displacement_has_exact_strain_and_stress(poisson):
-    """Patch test, on distorted elements, inside, on the surface and in a corner."""
     mesh = meshes.block((0.02, 0.02, 0.012), 3e-3)
     rng = np.random.default_rng(0)
     corners = np.unique(mesh.tets[:, :4])
@@ -66,11 +65,7 @@ def test_displacement_inside_a_body_is_interpolated():
         strain_operator(meshes.block((1.0, 1.0, 1.0), 0.5, order=1), solid(0.3), [[0, 0, -0.2]])
 
 
-FOCI = [(a * 5e-3, b * 5e-3) for a in (1, -1) for b in (1, -1)]
-
-
 def four_foci(poisson, point):
-    """Stress at a point below four foci, mirror images of each other: the sum of four."""
     total = np.zeros((3, 3))
     for x, y in FOCI:
         r, angle = np.hypot(point[0] - x, point[1] - y), np.arctan2(point[1] - y, point[0] - x)
@@ -83,14 +78,12 @@ def four_foci(poisson, point):
 
 @pytest.fixture(scope="module")
 def half_space():
-    """A quarter of a block that is much larger than the foci."""
     along = meshes.Grading(radius=12e-3, growth=1.5, coarsest=0.02)
     mesh = meshes.block((0.16, 0.16, 0.08), 2e-3, grading=along)
     return meshes.half(meshes.half(mesh, "x"), "y")
 
 
 def test_stress_below_a_focus_matches_boussinesq(half_space):
-    """At the surface too: sigma_zz = -p without shear; all within 3 % of the largest pressure."""
     poisson = 0.4999
     mesh, material = half_space, solid(poisson)
     ops = fem.assemble(mesh, material, fixed={"clamped": "xyz", "mirror_x": "x", "mirror_y": "y"})
@@ -110,9 +103,7 @@ def test_stress_below_a_focus_matches_boussinesq(half_space):
 
 @pytest.mark.parametrize("poisson", POISSON)
 def test_thick_cylinder_under_pressure_matches_lame(poisson):
-    """Plane strain, inner radius 1, outer 2: sigma_rr, sigma_tt = (A -+ B / r^2) p, A = 1/3,
-    B = 4/3 (Timoshenko and Goodier, Theory of Elasticity (1970), section 28).
-    """
+    """Stress (A -+ B / r^2) p, A = 1/3, B = 4/3 (Timoshenko and Goodier, section 28)."""
     mesh = meshes.extrude(np.linspace(0, 1, 7), np.linspace(0, 1, 9), np.linspace(-0.3, 0, 3))
     along, turn, z = mesh.points.T
     r, angle = 1 + along, turn * np.pi / 2
@@ -154,7 +145,6 @@ def test_strain_jumps_between_materials():
 
 
 def test_nodal_strain_equals_strain_at_points():
-    """All of them or some, by the same polynomials at corners, on a curved displacement."""
     mesh = meshes.block((0.012, 0.012, 0.012), 3e-3)
     middle = mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
     mesh = replace(mesh, region=(middle < -6e-3).astype(int))

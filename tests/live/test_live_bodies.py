@@ -38,13 +38,11 @@ def open_body(page, name, pack):
 
 
 def scenes(name, count, places=(), **tacton):
-    """Random scenes on a body, the same every time."""
     rng = np.random.default_rng(11)
     made = [random_scene(BODIES[name], rng, 0.15, places) for _ in range(count)]
     given = {"duration": 0.3} | tacton
-    return [
-        replace(s, pressure=replace(s.pressure, tacton=replace(s.tacton, **given))) for s in made
-    ]
+    loads = [replace(s.pressure, tacton=replace(s.tacton, **given)) for s in made]
+    return [replace(s, pressure=load) for s, load in zip(made, loads, strict=True)]
 
 
 def answer(page, name, scene):
@@ -52,7 +50,6 @@ def answer(page, name, scene):
 
 
 def line_errors(page, name, made, lines_of, smallest=SMALLEST, highest=HIGHEST):
-    """Relative errors of the page's lines above a share of the strongest."""
     errors = []
     for scene in made:
         own = answer(page, name, scene)
@@ -67,7 +64,6 @@ def line_errors(page, name, made, lines_of, smallest=SMALLEST, highest=HIGHEST):
 
 
 def wave_errors(page, name, made, waveform_of):
-    """Errors of the page's waveforms from rest in the L2 norm."""
     pairs = [(np.array(answer(page, name, scene)["u"]), waveform_of(scene)) for scene in made]
     return np.array([np.linalg.norm(own - u) / np.linalg.norm(u) for own, u in pairs])
 

@@ -15,6 +15,10 @@ ANSWER = """(own) => { const load = loadOf(own), x = own.x / 1e3, y = own.y / 1e
   const motion = respond(load), at = motion.at(x, y);
   return { values: own, load, x, y, body: { is_skin: true }, kernel: motion, kernelAt: at,
     waves: motion, wavesAt: at }; }"""
+REFUSED = (
+    "time [s],signal [V]\n0,1\n1,2\n2,3", "0,1\n1,2\n2,3", "time [s],u [m]\n0,1\n1,x\n2,3",
+    "time [s],u [m]\n0,1\n1,2\n5,3\n6,2", "f [Hz],re v [m/s],im v [m/s]\n1,1,1\n2,2,1\n3,1,1",
+)  # fmt: skip
 
 
 def test_tables_and_sound(page, starts, tmp_path):
@@ -57,12 +61,6 @@ def test_reading_of_measurements(page, tmp_path, header, mark, quantity):
     np.testing.assert_allclose(found["times"], wanted.times - wanted.times[0], atol=1e-12)
     if "(0,0)" in header:
         np.testing.assert_allclose(found["places"], wanted.places)
-
-
-REFUSED = (
-    "time [s],signal [V]\n0,1\n1,2\n2,3", "0,1\n1,2\n2,3", "time [s],u [m]\n0,1\n1,x\n2,3",
-    "time [s],u [m]\n0,1\n1,2\n5,3\n6,2", "f [Hz],re v [m/s],im v [m/s]\n1,1,1\n2,2,1\n3,1,1",
-)  # fmt: skip
 
 
 def test_other_files_are_refused(page):

@@ -23,10 +23,10 @@ pytestmark = needs_browser
 PLACES = [[0.0, 0.0], [0.01, -0.003], [-0.02, 0.015]]
 TIMES = np.arange(301) * 1e-4
 JUMPS = 5e-5  # relative error of lines of joined paths and of paths that jump
+WRONG = {"am": "high", "height": "90", "foci": "2.5", "pulses": "100", "paths": "circle/20/45/0"}
 
 
 def steady(pressure):
-    """The load during a pulse."""
     return replace(pressure, tacton=replace(pressure.tacton, rhythm=None))
 
 
@@ -41,9 +41,6 @@ def test_scene_files_and_addresses_preserve_values(page, starts):
         assert {key: back[key] for key in same} == pytest.approx({key: own[key] for key in same})
         texts = [re.sub(r"(?<=point)/\d+", "/0", own["paths"]), own["pulses"]]
         assert [back["paths"], back["pulses"]] == texts
-
-
-WRONG = {"am": "high", "height": "90", "foci": "2.5", "pulses": "100", "paths": "circle/20/45/0"}
 
 
 def test_invalid_input_is_refused(page):
@@ -127,7 +124,6 @@ def test_the_kernel_in_time_and_on_a_map(page, starts):
 
 
 def _check_map(scene, own, amplitudes):
-    """Check level, share and reach of a map."""
     levels = sensation_level(own["mean"] * np.array(amplitudes), own["f"], unit="Pa")
     if own["level"] is not None:
         assert own["level"]["dB"] == pytest.approx(levels.max(), abs=1e-6)

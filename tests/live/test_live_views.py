@@ -38,7 +38,6 @@ LOAD = MovingPressure(
 
 
 def grid(of):
-    """JavaScript array of a function of x, y in metre at the places of a map."""
     x, y = np.meshgrid(*2 * [np.linspace(-REACH, REACH, N)])
     return f"Float32Array.from({json.dumps(of(x, y).ravel().tolist())})"
 

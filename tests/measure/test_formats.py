@@ -1,7 +1,7 @@
 """Measurements in files that other libraries wrote, and in our own: the same numbers, exactly."""
 
 import itertools
-import warnings
+import wave
 
 import h5py
 import measurement_files as files
@@ -24,6 +24,30 @@ X = np.arange(4) * 5e-3  # m
 XYZ = np.column_stack([X, 0 * X, 0 * X])
 PHASE = -80.0 * X  # rad, of a wave of 80 rad/m
 WAVE = 2.0 * np.cos(2 * np.pi * 140 * T[:, None] + PHASE)  # mm/s
+FORCE = {"ordinate_spec_data_type": 13, "ordinate_axis_units_lab": "N", "id1": "Reference Time"}
+IN_F = {"func_type": 4, "abscissa_spec_data_type": 18}
+LVM = """LabVIEW Measurement\t
+Writer_Version\t2
+Separator\tTab
+Decimal_Separator\t{sign}
+Multi_Headings\tNo
+X_Columns\t{columns}
+Time_Pref\tRelative
+***End_of_Header***\t
+\t
+Channels\t2\t\t
+Samples\t1200\t1200\t
+Y_Unit_Label\t{unit}
+X_Dimension\tTime\tTime\t
+X0\t-2{sign}0E-2\t-2{sign}0E-2\t
+Delta_X\t1{sign}0E-4\t1{sign}0E-4\t
+***End_of_Header***\t\t\t
+"""
+LVM_COLUMNS = {
+    "One": (".", "left\tright", (T, TONE, OTHER), "lvm"),
+    "Multi": (".", "left\tX_Value\tright", (T, TONE, T, OTHER), "txt"),
+    "No": (",", "left\tright", (TONE, OTHER), "lvm"),
+}  # fmt: skip
 
 
 def assert_same_motion(found, values, places=PLACES_MM):
@@ -78,12 +102,9 @@ def test_wav_of_whole_numbers_and_of_floats(tmp_path):
 
 def test_wav_of_24_bits(tmp_path):
     levels = np.array([0, 1, -1, 2**23 - 1, -(2**23)])
-    raw = b"".join(int(x).to_bytes(3, "little", signed=True) for x in levels)
-    head = b"fmt " + (16).to_bytes(4, "little") + (1).to_bytes(2, "little")
-    head += (1).to_bytes(2, "little") + (1000).to_bytes(4, "little")
-    head += (3000).to_bytes(4, "little") + (3).to_bytes(2, "little") + (24).to_bytes(2, "little")
-    body = b"WAVE" + head + b"data" + len(raw).to_bytes(4, "little") + raw + b"\0"
-    (tmp_path / "a.wav").write_bytes(b"RIFF" + len(body).to_bytes(4, "little") + body)
+    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
+        file.setparams((1, 3, 1000, 0, "NONE", ""))
+        file.writeframes(b"".join(int(x).to_bytes(3, "little", signed=True) for x in levels))
     assert read(tmp_path / "a.wav", unit="m/s").values.ravel() == pytest.approx(levels / 2**23)
 
 
@@ -113,10 +134,6 @@ def test_universal_file_of_spectra(tmp_path):
 
 def uff(path, sets):
     """A file of nodes along x and of sets, whose defaults are those of a time response along z."""
-    path.unlink(missing_ok=True)
-    node = np.arange(1, len(X) + 1)
-    head = pyuff.prepare_2411(node_nums=node, def_cs=0 * node, disp_cs=0 * node, color=0 * node,
-                              x=X, y=0 * X, z=0 * X)  # fmt: skip
     kept = {
         "binary": 0, "func_type": 1, "rsp_dir": 3, "ref_node": 0, "ref_dir": 0, "x": T - T[0],
         "rsp_ent_name": "NONE", "ref_ent_name": "NONE", "abscissa_spacing": 1,
@@ -124,19 +141,11 @@ def uff(path, sets):
         "ordinate_axis_units_lab": "mm/s", "id1": "Response Time Trace",
     }  # fmt: skip
     every = [pyuff.prepare_58(**kept | one) for one in sets]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResourceWarning)  # pyuff does not close binary files
-        pyuff.UFF(str(path)).write_sets([head, *every], "add")
-    return path
+    return files.write_uff(path, [files.uff_nodes(X, 0 * X), *every])
 
 
 def each(motion, **changes):
-    """A set of each place."""
     return [{"rsp_node": p + 1, "data": motion[:, p]} | changes for p in range(len(X))]
-
-
-FORCE = {"ordinate_spec_data_type": 13, "ordinate_axis_units_lab": "N", "id1": "Reference Time"}
-IN_F = {"func_type": 4, "abscissa_spec_data_type": 18}
 
 
 def test_places_measured_one_after_the_other_are_aligned_by_their_references(tmp_path):
@@ -144,8 +153,8 @@ def test_places_measured_one_after_the_other_are_aligned_by_their_references(tmp
     burst = np.exp(-((T[:, None] + 0.02 + starts - 0.06) ** 2) / 2e-4)
     shown = T[:, None] + starts
     drive = np.sin(2 * np.pi * 140 * shown) * burst
-    wave = 2.0 * np.cos(2 * np.pi * 140 * shown + PHASE)
-    found = read(uff(tmp_path / "a.uff", [*each(wave), *each(drive, **FORCE)]), sign=1)
+    late = 2.0 * np.cos(2 * np.pi * 140 * shown + PHASE)
+    found = read(uff(tmp_path / "a.uff", [*each(late), *each(drive, **FORCE)]), sign=1)
     assert_wave(found, 2e-3)
     assert len(found.drive) == len(found.times)
 
@@ -275,30 +284,6 @@ def test_places_of_arrays_are_distinguished_from_samples(tmp_path):
     with pytest.raises(ValueError, match="--places"):
         read(tmp_path / "b.npz", unit="mm/s")
     assert_same_motion(read(tmp_path / "b.npz", unit="mm/s", places=PLACES_MM / 1e3), MM_S[:1])
-
-
-LVM = """LabVIEW Measurement\t
-Writer_Version\t2
-Separator\tTab
-Decimal_Separator\t{sign}
-Multi_Headings\tNo
-X_Columns\t{columns}
-Time_Pref\tRelative
-***End_of_Header***\t
-\t
-Channels\t2\t\t
-Samples\t1200\t1200\t
-Y_Unit_Label\t{unit}
-X_Dimension\tTime\tTime\t
-X0\t-2{sign}0E-2\t-2{sign}0E-2\t
-Delta_X\t1{sign}0E-4\t1{sign}0E-4\t
-***End_of_Header***\t\t\t
-"""
-LVM_COLUMNS = {
-    "One": (".", "left\tright", (T, TONE, OTHER), "lvm"),
-    "Multi": (".", "left\tX_Value\tright", (T, TONE, T, OTHER), "txt"),
-    "No": (",", "left\tright", (TONE, OTHER), "lvm"),
-}  # fmt: skip
 
 
 def test_labview_measurement(tmp_path):

@@ -17,6 +17,10 @@ from skinwave.system.effort import silent
 MODULUS = "body.material.shear_modulus_pa"
 N = 400
 SHAPE = 1 + np.sin(2 * np.pi * np.arange(N) / 150)
+VARY = (f"{MODULUS}=8000:80000", "gain=0.2:5", "delay_ms=-5:5")
+TRUE = {MODULUS: 26e3, "gain": 1.3, "delay_ms": -1.6}
+LINES = np.array([51.0, 140.0, 191.0, 331.0, 471.0])
+PLACES = np.array([5.0, 20.0, 35.0]) / 1e3
 
 
 def problem_of(values, model, error, vary, is_known=True, kind="lines"):
@@ -60,7 +64,6 @@ def test_correlation_of_a_straight_line_is_the_closed_form():
 
 
 def test_an_interval_over_which_the_model_bends_is_approximate():
-    """The square of 0.1, whose interval reaches from 0.02 to 0.18."""
     values = 0.01 + 0.0447 * np.tile([1.0, -1.0], 15)
     asked = problem_of(values, lambda v: v["offset_x_mm"] ** 2 + 0 * values, 0.0447,
                        ["offset_x_mm=-0.01:1.2"])  # fmt: skip
@@ -70,7 +73,6 @@ def test_an_interval_over_which_the_model_bends_is_approximate():
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
-    """Of 200 linear fits whose noise is unknown; 95 % within three standard errors."""
     rng = np.random.default_rng(1)
     shape, inside = rng.standard_normal(8), 0
     for _ in range(200):
@@ -85,9 +87,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     ("white", 1, "lines"), ("1/f2", 3, "amplitudes"),
 ])  # fmt: skip
 def test_gains_of_close_lines_hold_the_truth(monkeypatch, colour, repetitions, kind):
-    """Intervals of least squares of 200 draws, one a place, by the data's own errors: of lines 1.2
-    to 5 resolutions apart and of lines at all frequencies.
-    """
+    """Least squares of 200 draws by their own errors, of lines 1.2 to 5 resolutions apart."""
     samples, draws, rate = 1000, 200, 2000.0
     f0 = 1 / (0.75 * samples / rate)
     times = np.arange(samples) / rate
@@ -153,7 +153,6 @@ def test_widening_of_a_mean_is_that_of_effective_samples():
 
 
 def test_intervals_hold_the_truth_under_coloured_noise_and_stay_under_white():
-    """95 % of 100 draws; by independent errors it is 60 %."""
     rng, inside = np.random.default_rng(3), []
     for _ in range(100):
         found = of_slow_wave(coloured(rng, 0.8))
@@ -162,12 +161,6 @@ def test_intervals_hold_the_truth_under_coloured_noise_and_stay_under_white():
     assert 0.86 <= np.mean(inside) <= 0.99
     white = np.random.default_rng(2).standard_normal((N, 1))
     assert of_slow_wave(white).widenings.tolist() == [1.0, 1.0]
-
-
-VARY = (f"{MODULUS}=8000:80000", "gain=0.2:5", "delay_ms=-5:5")
-TRUE = {MODULUS: 26e3, "gain": 1.3, "delay_ms": -1.6}
-LINES = np.array([51.0, 140.0, 191.0, 331.0, 471.0])
-PLACES = np.array([5.0, 20.0, 35.0]) / 1e3
 
 
 def plane_waves(values):
@@ -190,7 +183,6 @@ def of_waves(true=TRUE, sign=1.0, vary=VARY):
 
 @pytest.mark.parametrize("modulus", [8.5e3, 70e3])
 def test_a_search_leaves_the_minimum_of_a_delay_a_period_off(modulus):
-    """Of a start with the wrong delay; the local search from it ends elsewhere."""
     asked = of_waves()
     u = np.array([each.position(x) for each, x in zip(
         asked.parameters.free, (modulus, 1.0, 3.6), strict=True)])  # fmt: skip

@@ -36,10 +36,19 @@ TEXTS = {
     "t [s], x [mm], y [mm], v [mm/s]\n0,0,0,1\n1,0,0,1\n0,5,0,1\n": "4 rows",
     "t [s], x [mm], y [mm], v [mm/s]\n0,0,0,1\n0,0,0,2\n1,0,0,1\n1,5,0,1\n": "row",
 }
+V = np.zeros((10, 2))
+OWN = {"format": "skinwave measurement 1", "quantity": "velocity", "unit": "m/s"}
+MM_S = ["--unit", "mm/s"]
+OPTIONS = [
+    (["--places", "0,0"], "1 place"),
+    (["--quantity", "velocty"], "did you mean 'velocity'?"),
+    (["--unit", "furlong"], "'furlong'"),
+    (["--rate", "0"], "above 0"),
+    (["--false-alarm", "2"], "between 0 and 1"),
+]
 
 
 def bytes_of(write, *arguments, **options):
-    """Content that a function writes into a file."""
 
     def content(folder, name):
         write(folder / name, *arguments, **options)
@@ -66,9 +75,6 @@ def wav(array):
     return bytes_of(wavfile.write, 1000, array)
 
 
-V = np.zeros((10, 2))
-OWN = {"format": "skinwave measurement 1", "quantity": "velocity", "unit": "m/s"}
-MM_S = ["--unit", "mm/s"]
 # Name of the file, its content, options, and what is named.
 BINARIES = [
     ("a.csv", lambda *_: b"\xff\x00t", [], "not text"),
@@ -97,13 +103,6 @@ BINARIES = [
     ("model-1-location-01.f32", lambda *_: b"x" * 9, [], "9 bytes"),
     ("a.docx", lambda *_: b"", [], "'.docx'"),
 ]  # fmt: skip
-OPTIONS = [
-    (["--places", "0,0"], "1 place"),
-    (["--quantity", "velocty"], "did you mean 'velocity'?"),
-    (["--unit", "furlong"], "'furlong'"),
-    (["--rate", "0"], "above 0"),
-    (["--false-alarm", "2"], "between 0 and 1"),
-]
 
 
 def refused(folder, capsys, arguments):

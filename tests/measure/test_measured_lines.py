@@ -1,8 +1,4 @@
-"""Lines of measurements, their noise, delay and gain against a model, and coherence.
-
-Measurements are sums of sinusoids of known phasors, with normal noise of known size, and what is
-stated of them is counted over many draws.
-"""
+"""Lines of measurements of known phasors and noise: what is stated is counted over many draws."""
 
 from dataclasses import replace
 
@@ -22,6 +18,8 @@ MODEL = (RNG.normal(size=(6, 4)) + 1j * RNG.normal(size=(6, 4))) * np.array(
     [0.1, 1.0, 1.5, 0.2, 0.5, 0.6]
 )[:, None]
 TIMES = np.arange(SAMPLES) / RATE
+BIN = 1 / (0.75 * SAMPLES / RATE)
+SPACED = {apart: 150 + apart * BIN * np.arange(5) for apart in (1.2, 2.0, 3.0, 5.0)}
 
 
 def waveforms(phasors, frequencies=LINES, times=TIMES):
@@ -39,7 +37,6 @@ def measured(rng, repetitions, sigma, phasors=None, **changes):
 
 
 def only(each, variance=None):
-    """Lines of amplitudes (r, f, p) as they are."""
     return MeasuredLines(
         frequencies=LINES[: each.shape[1]], each=each, freedom=2.0 * (len(each) - 1),
         variance=each.var(axis=0, ddof=1) / len(each) if variance is None else variance,
@@ -62,10 +59,8 @@ def test_lines_without_noise_are_those_that_were_put_in():
 @pytest.mark.parametrize("repetitions", [1, 4])
 def test_delay_and_gain_are_within_their_errors_as_often_as_is_said(repetitions):
     rng = np.random.default_rng(20 + repetitions)
-    found = [
-        align(lines_of(measured(rng, repetitions, 0.2), LINES), MODEL, window=0.05)
-        for _ in range(100)
-    ]
+    draws = (lines_of(measured(rng, repetitions, 0.2), LINES) for _ in range(100))
+    found = [align(lines, MODEL, window=0.05) for lines in draws]
     of_delay = np.array([(a.delay - DELAY) / a.delay_error for a in found])
     of_gain = np.array([(a.gain - GAIN) / a.gain_error for a in found])
     for off in (of_delay, of_gain):  # the binomial bounds of 95 % in 100 draws at 0.1 %
@@ -78,11 +73,7 @@ def test_a_delay_is_known_up_to_the_period_of_what_was_measured():
     delay = 10e-3
     model = MODEL[1:2]
     each = GAIN * np.exp(-2j * np.pi * 140 * delay) * model + 0.01 * complex_noise(RNG, 4, 1, 4)
-    lines = MeasuredLines(
-        frequencies=np.array([140.0]), each=each, variance=each.var(axis=0, ddof=1) / 4,
-        freedom=6.0, shifts=np.zeros(4),
-    )  # fmt: skip
-    found = align(lines, model)
+    found = align(replace(only(each), frequencies=np.array([140.0])), model)
     assert found.delay == pytest.approx(delay - 1 / 140, abs=5 * found.delay_error)
     assert found.repeats == pytest.approx(1 / 140, rel=1e-6)
 
@@ -152,27 +143,21 @@ def test_holms_correction_is_its_definition():
     assert holm(np.array([[0.9, 0.8]])).max() == 1.0
 
 
-BIN = 1 / (0.75 * SAMPLES / RATE)
-SPACED = {apart: 150 + apart * BIN * np.arange(5) for apart in (1.2, 2.0, 3.0, 5.0)}
 SPACED["low"] = np.array([3.75, 12.0, 40.0]) * BIN
 
 
 def noisy(rng, frequencies, colour, repetitions, draws=200):
-    """Lines of amplitude 3 in white noise or a random walk, a draw at each place."""
     noise = rng.normal(size=(repetitions, SAMPLES, draws))
     if colour == "1/f2":
         noise = noise.cumsum(axis=1)
-    return Measurement(
-        quantity="velocity", places=np.zeros((draws, 2)), times=TIMES,
-        values=waveforms(np.full((len(frequencies), draws), 3.0), frequencies) + noise,
-    )  # fmt: skip
+    values = waveforms(np.full((len(frequencies), draws), 3.0), frequencies) + noise
+    places = np.zeros((draws, 2))
+    return Measurement(quantity="velocity", places=places, times=TIMES, values=values)
 
 
 @pytest.mark.parametrize(("colour", "repetitions"), [("white", 1), ("1/f2", 1), ("1/f2", 3)])
 def test_intervals_hold_the_truth_however_close_the_lines_and_steep_the_noise(colour, repetitions):
-    """95 % circles and intervals of a sum of all lines and of a difference of two, in 200 draws of
-    each spacing.
-    """
+    """95 % circles, and intervals of a sum and of a difference, in 200 draws."""
     rng, inside, ratios = np.random.default_rng(repetitions), [], []
     for f in SPACED.values():
         found = lines_of(noisy(rng, f, colour, repetitions), f)
@@ -203,10 +188,8 @@ def test_a_gain_that_changes_between_repetitions_is_in_the_errors():
 def spectra(repetitions, sigma, frequencies, amplitudes):
     rng = np.random.default_rng(13)
     noise = sigma * complex_noise(rng, repetitions, *amplitudes.shape)
-    return Measurement(
-        quantity="velocity", places=np.zeros((amplitudes.shape[1], 2)), frequencies=frequencies,
-        values=amplitudes + noise,
-    )  # fmt: skip
+    given = {"frequencies": frequencies, "values": amplitudes + noise}
+    return Measurement(quantity="velocity", places=np.zeros((amplitudes.shape[1], 2)), **given)
 
 
 def test_spectra_have_lines_in_their_bins_and_noise_beside_them():

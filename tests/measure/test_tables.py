@@ -7,9 +7,24 @@ from skinwave.measure.reading import parse_places, read
 
 RATE, COUNT, START = 10_000.0, 1200, -0.02
 T = START + np.arange(COUNT) / RATE
+UNEVEN = T + 3e-5 * np.sin(np.arange(COUNT) ** 2.0)
 TONE = 2.0 * np.sin(2 * np.pi * 140 * T + 0.3)  # mm/s, or what 1 stands for
 OTHER = 0.5 * np.sin(2 * np.pi * 140 * T - 1.1)
 MM_S = {"unit": "mm/s"}
+SCOPY = ";Scopy version,48fb6a9\n;Device,M2K\n;Sample rate,10000\nSample,Time(S),CH1(V),CH2(V)\n"
+SIGLENT = "Record Length,Analog:1200\nSample Interval,Analog:0.0001\nSource,CH1\nSecond,Volt\n"
+TEKTRONIX = "Model,T\n\nHorizontal Units,S,\nSample Interval,0.0001,\n\nLabel,,\nTIME,CH1,CH2\n"
+RIGOL = "X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,-2.0e-02,1.0e-04\n"
+BESIDE = ["Record Length,1.2e+03,,", "Sample Interval,1e-04,,", "Horizontal Units,s,,"]
+BOTH = MM_S | {"places": [(0.0, 0.0), (0.005, 0.0)]}
+TWO_BY_TWO = [[[0.0015, 0.002], [0.003, 0.004]]]  # m/s
+HEADERS = (
+    "t [s] v(0,0) [mm/s] v(5,0) [mm/s]\n0 1.5 2\n0.5 3 4\n",
+    "Time (s);Left (mm/s);Right (mm/s)\n0,0;1,5;2\n0,5;3;4\n",
+    '# note\n"t [s]","v(0,0) [m/s]","v(5,0) [m/s]"\n"0","0.0015","0.002"\n0.5,0.003,"0.004"\n',
+    "t_ms,velocity_mm_s,velocity_mm_s\n0,1.5,2\n500,3,4\n",
+    "t [s],x [mm],y [mm],v [mm/s]\n0,0,0,1.5\n0.5,0,0,3\n0.5,5,0,4\n0,5,0,2\n",
+)
 
 
 def rows(*columns, sep=",", comma=False, tail="", digits="%.7g"):
@@ -19,7 +34,6 @@ def rows(*columns, sep=",", comma=False, tail="", digits="%.7g"):
 
 
 def numbered(text):
-    """A table with a count of its rows before each."""
     return "".join(f"{k},{row}\n" for k, row in enumerate(text.splitlines()))
 
 
@@ -49,14 +63,6 @@ def clock(t, text="2026-01-05 10:00:%09.6f"):
 
 TWO = rows(T, TONE, OTHER)
 GERMAN = rows(T, TONE, sep=";", comma=True)
-SCOPY = ";Scopy version,48fb6a9\n;Device,M2K\n;Sample rate,10000\nSample,Time(S),CH1(V),CH2(V)\n"
-SIGLENT = "Record Length,Analog:1200\nSample Interval,Analog:0.0001\nSource,CH1\nSecond,Volt\n"
-TEKTRONIX = (
-    "Model,TBS1102B\n\nHorizontal Units,S,\nSample Interval,0.0001,\n\nLabel,,\nTIME,CH1,CH2\n"
-)
-RIGOL = "X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,-2.0e-02,1.0e-04\n"
-BESIDE = ["Record Length,1.2e+03,,", "Sample Interval,1e-04,,", "Horizontal Units,s,,"]
-BOTH = MM_S | {"places": [(0.0, 0.0), (0.005, 0.0)]}
 # Content of a file, options, and number of places.
 TABLES = {
     "keysight": ("x-axis,1,2\nsecond,Volt,Volt\n" + TWO, BOTH | {"rate": RATE}, 2),
@@ -93,10 +99,7 @@ TABLES = {
     "decimal commas in quotes": ('sep=,\n"t [s]","v [mm/s]"\n' + "".join(
         '"{}","{}"\n'.format(*row.split(";")) for row in GERMAN.splitlines()), {}, 1),
     "index of a data frame": (",t [s],v [mm/s]\n" + numbered(rows(T, TONE)), {}, 1),
-    "uneven times, rate given": (
-        rows(T + 3e-5 * np.sin(np.arange(COUNT) ** 2.0), TONE, digits="%.9g"),
-        MM_S | {"rate": RATE}, 1,
-    ),
+    "uneven times, rate given": (rows(UNEVEN, TONE, digits="%.9g"), MM_S | {"rate": RATE}, 1),
     "quantity chosen": (
         "t [s],u [um],v [mm/s]\n" + rows(T, OTHER, TONE), {"quantity": "velocity"}, 1
     ),
@@ -166,7 +169,6 @@ def test_short_gaps_are_interpolated_at_their_times_and_long_ones_refused(tmp_pa
 
 
 def test_gaps_without_times_keep_their_samples(tmp_path):
-    """Of a line for each sample, an empty one is a sample that is missing."""
     lines = rows(TONE, OTHER).splitlines()
     lines[500:504] = [","] * 4
     (tmp_path / "a.csv").write_text("\n".join(["v [mm/s],w [mm/s]", *lines]))
@@ -229,18 +231,6 @@ def test_lost_times_and_sizes_are_refused(tmp_path):
             read(tmp_path / f"{name}.csv", **given)
 
 
-TWO_BY_TWO = [[[0.0015, 0.002], [0.003, 0.004]]]  # m/s
-
-
-HEADERS = (
-    "t [s] v(0,0) [mm/s] v(5,0) [mm/s]\n0 1.5 2\n0.5 3 4\n",
-    "Time (s);Left (mm/s);Right (mm/s)\n0,0;1,5;2\n0,5;3;4\n",
-    '# note\n"t [s]","v(0,0) [m/s]","v(5,0) [m/s]"\n"0","0.0015","0.002"\n0.5,0.003,"0.004"\n',
-    "t_ms,velocity_mm_s,velocity_mm_s\n0,1.5,2\n500,3,4\n",
-    "t [s],x [mm],y [mm],v [mm/s]\n0,0,0,1.5\n0.5,0,0,3\n0.5,5,0,4\n0,5,0,2\n",
-)
-
-
 def test_headers_of_many_programs(tmp_path):
     for text in HEADERS:
         (tmp_path / "a.txt").write_text(text)
@@ -259,11 +249,8 @@ def test_a_rate_that_holds_no_vibration_and_a_place_without_a_signal_are_said(tm
 
 
 def test_places_are_pairs_in_millimetre(tmp_path):
-    for text in (
-        "x [mm],y [mm]\n0,0\n5,-2.5\n",
-        "0 0\n5 -2.5\n",
-        "x_m,y_m,z_m\n0,0,1\n0.005,-0.0025,1",
-    ):
+    heads = ("x [mm],y [mm]\n0,0\n5,-2.5\n", "0 0\n5 -2.5\n", "x_m,y_m,z_m\n0,0,1\n.005,-.0025,1")
+    for text in heads:
         (tmp_path / "a.csv").write_text(text)
         assert np.array_equal(parse_places(str(tmp_path / "a.csv")), [[0, 0], [0.005, -0.0025]])
     (tmp_path / "a.csv").write_text("x [mm],z [mm]\n0,0\n")

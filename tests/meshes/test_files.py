@@ -27,10 +27,12 @@ GMSH_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)]  # of gmsh's manua
 
 SLAB = meshes.block((0.040, 0.040, 0.012), 0.010, order=1)
 TETRAHEDRON, HEXAHEDRON, WEDGE, PYRAMID = 10, 12, 13, 14  # in VTK
+CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)]
+TWO = [(7, (0, 1, 2, 3)), (9, (1, 2, 3, 4))]
+NAMES = '$PhysicalNames\n2\n2 5 "the lid"\n3 7 "skin"\n$EndPhysicalNames'
 
 
 def layered(order):
-    """A block of two regions with the facet sets of its sides, one of them empty."""
     mesh = meshes.block((0.02, 0.03, 0.01), 0.005, order=order)
     region = np.where(mesh.points[mesh.tets].mean(axis=1)[:, 2] > -0.005, 3, 0)
     return replace(mesh, region=region, facets={**mesh.facets, "no one": mesh.facets["top"][:0]})
@@ -47,24 +49,17 @@ def same(one, other):
 
 
 def half(side):
-    """Points and tetrahedra of the slab on one side (-1, 1) of x = 0."""
     kept = side * SLAB.points[SLAB.tets].mean(axis=1)[:, 0] > 0
     nodes, tets = np.unique(SLAB.tets[kept], return_inverse=True)
     return SLAB.points[nodes], tets.reshape(-1, 4)
 
 
 def grid_of(points, cells):
-    """An unstructured grid of cells, by VTK's number of their type."""
-    return pyvista.UnstructuredGrid(
-        {kind: np.array(nodes) for kind, nodes in cells.items()}, points
-    )
+    return pyvista.UnstructuredGrid({kind: np.array(x) for kind, x in cells.items()}, points)
 
 
 def boxes(nx, ny, nz, size):
-    """Nodes of a box of bricks below z = 0, and the eight of each brick."""
-    lines = [
-        np.linspace(-0.5, 0.5, n + 1) * side for n, side in zip((nx, ny, nz), size, strict=True)
-    ]
+    lines = [np.linspace(-0.5, 0.5, n + 1) * L for n, L in zip((nx, ny, nz), size, strict=True)]
     x, y, z = np.meshgrid(*lines, indexing="ij")
     number = np.arange(x.size).reshape(x.shape)
     a = [number[i : nx + i, j : ny + j, k : nz + k] for k in (0, 1) for i, j in
@@ -74,13 +69,11 @@ def boxes(nx, ny, nz, size):
 
 
 def import_body(file, h=0.008, **options):
-    """The body of a file, and what is said of it."""
     said = []
     return meshes.body_from_file(file, h, say=said.append, **options), said
 
 
 def refused(file, **options):
-    """The sentence with which a file is refused."""
     with pytest.raises(MeshError) as error:
         meshes.body_from_file(file, 0.008, **options)
     assert "\n" not in str(error.value)
@@ -104,7 +97,6 @@ def test_a_mesh_is_read_as_it_was_written(tmp_path, suffix, order):
 
 
 def gmsh_file(path, points, tets, *, edges=GMSH_EDGES, triangles=(), names=""):
-    """A mesh of 10-node tetrahedra in version 2.2, written by hand."""
     place = {tuple(point): i + 1 for i, point in enumerate(points)}
     rows, elements = [list(p) for p in points], []
 
@@ -126,11 +118,6 @@ def gmsh_file(path, points, tets, *, edges=GMSH_EDGES, triangles=(), names=""):
     lines += ["$EndNodes", "$Elements", str(len(elements))]
     lines += [f"{i + 1} {element}" for i, element in enumerate(elements)]
     path.write_text("\n".join([*lines, "$EndElements", ""]))
-
-
-CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)]
-TWO = [(7, (0, 1, 2, 3)), (9, (1, 2, 3, 4))]
-NAMES = '$PhysicalNames\n2\n2 5 "the lid"\n3 7 "skin"\n$EndPhysicalNames'
 
 
 def in_the_middle(mesh):
@@ -182,7 +169,6 @@ def test_vtu_of_every_encoding_is_read_with_field_data(tmp_path, mode, compresso
 
 
 def pieces_vtu(path):
-    """A file of two pieces, written by hand."""
     text = []
     for points, tets in map(half, (-1, 1)):
         rows = "\n".join(" ".join(map(repr, map(float, p))) for p in points)
@@ -222,9 +208,7 @@ def test_blocks_are_regions_by_their_names(tmp_path):
 
 
 def mixed():
-    """A box of hexahedra, wedges and pyramids, every node turned a little within its cell's face
-    planes, as columns of bricks that are split differently.
-    """
+    """Points and cells of a box of hexahedra, wedges and pyramids: bricks split differently."""
     points, bricks = boxes(4, 4, 2, (0.040, 0.040, 0.012))
     where = points[bricks].mean(axis=1)
     left, middle = where[:, 0] < 0, where[:, 1] < 0
@@ -253,16 +237,18 @@ def test_hexahedra_wedges_and_pyramids_are_split_conformingly(tmp_path):
     assert off.max() < 1e-12
 
 
+def write_groups(path, points, cells, groups, names):
+    data = dict.fromkeys(("gmsh:physical", "gmsh:geometrical"), groups)
+    numbers = {name: np.array(number) for name, number in names.items()}
+    raw = meshio.Mesh(points, cells, cell_data=data, field_data=numbers)
+    meshio.write(path, raw, file_format="gmsh22")
+
+
 def test_facets_of_hexahedra_stay_in_their_sets(tmp_path):
     points, bricks = boxes(3, 2, 2, (0.030, 0.020, 0.010))
     top = bricks[np.isclose(points[bricks][:, 4:, 2].mean(axis=1), 0)][:, 4:]
-    raw = meshio.Mesh(
-        points, [("hexahedron", bricks), ("quad", top)],
-        cell_data={"gmsh:physical": [np.full(len(bricks), 1), np.full(len(top), 2)],
-                   "gmsh:geometrical": [np.full(len(bricks), 1), np.full(len(top), 2)]},
-        field_data={"skin": np.array([1, 3]), "top": np.array([2, 2])},
-    )  # fmt: skip
-    meshio.write(tmp_path / "a.msh", raw, file_format="gmsh22")
+    groups, names = [np.full(len(bricks), 1), np.full(len(top), 2)], {"skin": [1, 3], "top": [2, 2]}
+    write_groups(tmp_path / "a.msh", points, [("hexahedron", bricks), ("quad", top)], groups, names)
     mesh = meshes.read(tmp_path / "a.msh")
     assert mesh.region_names == {1: "skin"}
     facets = mesh.points[mesh.facets["top"]]
@@ -273,18 +259,15 @@ def test_facets_of_hexahedra_stay_in_their_sets(tmp_path):
 
 
 def abaqus(parts, instances="", head="*HEADING\n"):
-    """An input file of parts (name, lines after *PART) and instances."""
     text = head
     for name, body in parts:
         text += f"*Part, name={name}\n{body}*End Part\n"
     return text + f"*Assembly, name=A\n{instances}*End Assembly\n"
 
 
-def nodes_and_elements(points, tets, more="", first=1):
-    rows = [f"{i + first}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in enumerate(points.tolist())]
-    cells = [
-        f"{i + 1}, " + ", ".join(map(str, tet)) for i, tet in enumerate((tets + first).tolist())
-    ]
+def nodes_and_elements(points, tets, more=""):
+    rows = [f"{i}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in enumerate(points.tolist(), 1)]
+    cells = [f"{i}, {', '.join(map(str, tet))}" for i, tet in enumerate((tets + 1).tolist(), 1)]
     return "*Node\n" + "\n".join(rows) + f"\n*Element, type=C3D4{more}\n" + "\n".join(cells) + "\n"
 
 
@@ -303,9 +286,8 @@ def test_instances_are_placed_by_translation_and_rotation(tmp_path):
     assert "2 separate bodies (9.6, 9.6 cm3)" in refused(tmp_path / "a.inp")
     # A translation comes before the rotation, here about an axis away from the origin.
     moved = "0.1, 0., 0.\n0.1, 0., 0., 0.1, 0., 1., 90."
-    (tmp_path / "a.inp").write_text(
-        abaqus(part, f"*Instance, name=A-1, part=BAR\n{moved}\n*End Instance\n")
-    )
+    instance = f"*Instance, name=A-1, part=BAR\n{moved}\n*End Instance\n"
+    (tmp_path / "a.inp").write_text(abaqus(part, instance))
     x, y, _ = half(-1)[0].T
     read = meshes.read(tmp_path / "a.inp")
     np.testing.assert_allclose(np.ptp(read.points[:, :2], axis=0), [np.ptp(y), np.ptp(x)])
@@ -315,9 +297,7 @@ def test_instances_are_placed_by_translation_and_rotation(tmp_path):
 
 def test_touching_parts_with_equal_numbers_are_merged(tmp_path):
     parts = [(name, nodes_and_elements(*half(side))) for name, side in (("SKIN", -1), ("BONE", 1))]
-    instances = "".join(
-        f"*Instance, name={name}-1, part={name}\n*End Instance\n" for name, _ in parts
-    )
+    instances = "".join(f"*Instance, name={n}-1, part={n}\n*End Instance\n" for n, _ in parts)
     (tmp_path / "a.inp").write_text(abaqus(parts, instances))
     mesh, _ = import_body(tmp_path / "a.inp")
     assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
@@ -376,12 +356,8 @@ def test_overlapping_groups_give_the_smaller_as_region(tmp_path):
     upper = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
     tets = np.vstack([SLAB.tets, SLAB.tets])
     groups = np.concatenate([np.full(len(SLAB.tets), 1), np.where(upper, 2, 3)])
-    raw = meshio.Mesh(
-        SLAB.points, [("tetra", tets)],
-        cell_data={"gmsh:physical": [groups], "gmsh:geometrical": [groups]},
-        field_data={"all": np.array([1, 3]), "skin": np.array([2, 3]), "fat": np.array([3, 3])},
-    )  # fmt: skip
-    meshio.write(tmp_path / "a.msh", raw, file_format="gmsh22")
+    names = {"all": [1, 3], "skin": [2, 3], "fat": [3, 3]}
+    write_groups(tmp_path / "a.msh", SLAB.points, [("tetra", tets)], [groups], names)
     mesh, said = import_body(tmp_path / "a.msh")
     assert set(mesh.region_names.values()) == {"skin", "fat"}
     assert said_of(said, "their region is the smaller of their groups")
@@ -474,8 +450,7 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch):
     (tmp_path / "a.vtu").write_text("mine")
 
     def half_written(path, *arguments, **options):
-        with open(path, "w") as file:
-            file.write("half")
+        Path(path).write_text("half")
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(meshio, "write", half_written)
@@ -530,7 +505,6 @@ def test_a_surface_inside_another_is_refused(tmp_path):
 
 @functools.cache
 def hand():
-    """Points in metre and triangles of a hand with seams, its palm towards -x."""
     found = read_contents(HAND)
     return found.points, found.triangles
 
@@ -574,11 +548,8 @@ def test_truncated_and_garbled_files_are_refused(tmp_path, monkeypatch, suffix):
         meshes.write(path, layered(2))
     content = path.read_bytes()
     third = len(content) // 3
-    for spoilt in (
-        content[: 2 * third],
-        content[:third] + b"\xff" * third + content[2 * third :],
-        content[::-1],
-    ):
+    garbled = content[:third] + b"\xff" * third + content[2 * third :]
+    for spoilt in (content[: 2 * third], garbled, content[::-1]):
         path.write_bytes(spoilt)
         assert path.name in refused(path)
         assert [each.name for each in tmp_path.iterdir()] == [path.name]

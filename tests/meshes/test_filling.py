@@ -121,7 +121,6 @@ def save(path, surface):
 
 @pytest.mark.usefixtures("read_here")
 def test_a_bone_inside_a_body_is_a_region_of_scenes(tmp_path, monkeypatch, capsys):
-    """With a grid in place of the mesher, whose planes are the sides of the bone."""
     grid = meshes.block((0.020, 0.016, 0.012), 1e-3, order=1)
     monkeypatch.setattr(tetra, "_run", lambda inputs, timeout: (grid.points, grid.tets))
     monkeypatch.setenv("SKINWAVE_CACHE", "")

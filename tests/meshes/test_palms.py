@@ -1,6 +1,7 @@
 """Palms: their level set, their mapped structured meshes, and curved elements."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,17 +17,11 @@ from skinwave.scene.scene import BODIES, Relief
 
 
 def test_the_gradient_is_the_slope_of_the_level_set():
-    points = np.random.default_rng(1).uniform(
-        (-0.05, -0.055, -0.03), (0.05, 0.055, 0.01), (5000, 3)
-    )
-    steps = 1e-7 * np.eye(3)
-    slopes = [
-        (shape.level_set(Palm(), points + s) - shape.level_set(Palm(), points - s)) / 2e-7
-        for s in steps
-    ]
-    np.testing.assert_allclose(
-        shape.gradient(Palm(), points), np.transpose(slopes), atol=1e-6, rtol=0
-    )
+    low, high, value = (-0.05, -0.055, -0.03), (0.05, 0.055, 0.01), partial(shape.level_set, Palm())
+    points = np.random.default_rng(1).uniform(low, high, (5000, 3))
+    slopes = [(value(points + s) - value(points - s)) / 2e-7 for s in 1e-7 * np.eye(3)]
+    found = shape.gradient(Palm(), points)
+    np.testing.assert_allclose(found, np.transpose(slopes), atol=1e-6, rtol=0)
 
 
 def test_without_relief_the_top_is_a_plane():
@@ -103,7 +98,6 @@ def test_a_relief_that_a_grid_cannot_follow_is_refused():
 
 
 def test_the_default_relief_fits_small_palms():
-    """Its volume is below that of the box and its mounds, and above half of the box."""
     width, height, depth = 0.03, 0.12, 0.008
     body = Body(kind="palm", width=width, height=height, depth=depth)
     mesh = mapped_palm(body.palm, *body_palm.body_lines(body, min(depth / 2, 8e-3)))

@@ -53,7 +53,6 @@ def test_arrays_that_unpack_beyond_the_limit_are_refused(tmp_path, monkeypatch):
 
 
 def test_time_and_memory_of_a_reader_are_limited(tmp_path, monkeypatch):
-    """A few bytes that ask for a terabyte, and ones that are read for ever."""
     node = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n"
     path = tmp_path / "a.inp"
     path.write_text(node)
@@ -83,9 +82,6 @@ def test_a_separate_process_returns_results_and_errors():
             subprocess_call.call(bytearray, 2_000_000_000, timeout=600, memory=500_000_000)
 
 
-# The cache
-
-
 @pytest.fixture
 def home(tmp_path, monkeypatch):
     monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / "cache"))
@@ -93,7 +89,6 @@ def home(tmp_path, monkeypatch):
 
 
 def stored(name, size=1000):
-    """Keep an entry of so many bytes, and a little more."""
     cache.store(name, {"version": 3}, x=np.arange(size // 8, dtype=np.float64))
 
 

@@ -53,9 +53,8 @@ def test_places_up_to_the_silhouette_are_read_exactly(mesh):
     for axis in (0, 1):
         field = np.zeros_like(mesh.points)
         field[:, 2] = mesh.points[:, axis]  # which the elements carry exactly
-        np.testing.assert_allclose(
-            read @ field.ravel() - upwards * places[on, axis], 0, atol=1e-9 * np.ptp(corners)
-        )
+        off = read @ field.ravel() - upwards * places[on, axis]
+        np.testing.assert_allclose(off, 0, atol=1e-9 * np.ptp(corners))
     # What is seen is as large as all facets, seen from above.
     first, second = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
     area = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum() / 2
@@ -66,7 +65,6 @@ def test_places_up_to_the_silhouette_are_read_exactly(mesh):
 
 @pytest.fixture(scope="module")
 def roof(tmp_path_factory):
-    """A scene on a creased body in a file, with probes beside the crease and at a node."""
     flat = meshes.block((0.016, 0.016, 0.008), SIZE)
     share = 1 + flat.points[:, 2] / 0.008
     lower = np.outer(-0.3 * share * np.abs(flat.points[:, 0]), [0, 0, 1])

@@ -1,5 +1,8 @@
 """Surfaces: their measures, repair, crossings and winding, and what no mesher is given."""
 
+from itertools import combinations
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
@@ -14,14 +17,12 @@ from meshes.volume import tetrahedralise as tetra
 
 
 def cube(side=0.02, at=(0, 0, 0)):
-    """Twelve triangles."""
     box = meshes.block((side, side, side), side, order=1)
     surface, _ = repaired(box.points, meshes.boundary_facets(box.tets))
     return Surface(points=surface.points + at, triangles=surface.triangles)
 
 
 def sphere(radius=0.01, n=12):
-    """A cube's grid blown up to a sphere."""
     lines = [np.linspace(-1, 1, n)] * 3
     box = meshes.extrude(*lines, order=1)
     surface, _ = repaired(box.points, meshes.boundary_facets(box.tets))
@@ -43,7 +44,6 @@ def open_sphere():
 
 
 def pinched():
-    """Two cubes that share one corner."""
     pair = together(cube(), cube(at=(0.02, 0.02, 0.02)))
     return repaired(pair.points, pair.triangles)[0]
 
@@ -99,12 +99,8 @@ REFUSED = {
 
 @pytest.fixture
 def no_mesher(monkeypatch, tmp_path):
-    """The mesher must not even be started, and nothing be left in the current folder."""
 
-    def started(*arguments):
-        raise AssertionError("the mesher was started")
-
-    monkeypatch.setattr(tetra, "_run", started)
+    monkeypatch.setattr(tetra, "_run", Mock(side_effect=AssertionError("the mesher was started")))
     monkeypatch.chdir(tmp_path)
     yield
     assert not list(tmp_path.iterdir())
@@ -167,12 +163,8 @@ def test_crossings_agree_with_testing_every_pair():
                 return True
         return False
 
-    expected = [
-        (i, j)
-        for i in range(60)
-        for j in range(i + 1, 60)
-        if pierces(points[i], points[j]) or pierces(points[j], points[i])
-    ]
+    expected = [(i, j) for i, j in combinations(range(60), 2)
+                if pierces(points[i], points[j]) or pierces(points[j], points[i])]  # fmt: skip
     assert len(expected) > 10
     assert [tuple(pair) for pair in self_intersections(soup).tolist()] == expected
 
@@ -203,7 +195,6 @@ def test_rotations_take_each_axis_to_z():
 
 
 def box(sides, at=(0.0, 0.0, 0.0), h=np.inf):
-    """Triangles of a box in metre about a point of its top."""
     made = meshes.block(sides, min(h, *sides), order=1)
     surface, _ = repaired(made.points, meshes.boundary_facets(made.tets))
     return Surface(points=surface.points + at, triangles=surface.triangles)

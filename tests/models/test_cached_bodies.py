@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from corpus import FREE, SHORT
 
 import fem
 from meshes import cache
@@ -13,32 +14,6 @@ from skinwave.models.reduced import answer, prepare
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import solve
 from skinwave.scene.file import loads
-
-SHORT = """
-name = "short"
-[tacton]
-am_frequency_hz = 140
-duration_s = 0.05
-[body]
-size_x_mm = 60
-size_y_mm = 60
-[probes]
-points_mm = [[0, 0], [5, 0]]
-"""
-FREE = """
-[tacton]
-am_frequency_hz = 226
-duration_s = 0.09
-[body]
-size_x_mm = 29.3
-size_y_mm = 20
-thickness_mm = 9.9
-base = "free"
-sides = "clamped"
-material = {density_kg_m3 = 1000, shear_modulus_pa = 30100, poisson = 0.4999, viscosity_pa_s = 4.3}
-[probes]
-points_mm = [[-5.3, 8.7], [-0.5, -1.1], [-7.7, -1.3]]
-"""
 
 
 def test_a_prepared_body_comes_from_the_cache_unchanged(tmp_path, monkeypatch):
@@ -54,17 +29,6 @@ def test_a_prepared_body_comes_from_the_cache_unchanged(tmp_path, monkeypatch):
     np.testing.assert_array_equal(first.displacement, again.displacement)
     prepare(*arguments, h=0.008)
     assert "reduce" in phases  # another mesh is another entry
-
-
-def test_a_spoilt_cache_entry_is_rebuilt(tmp_path, monkeypatch):
-    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
-    scene = loads(SHORT)
-    first = answer(prepare(scene.body, scene.probe_points, h=0.012), scene)
-    (entry,) = tmp_path.glob("*.npz")
-    for spoilt in (b"", b"not a zip", entry.read_bytes()[: entry.stat().st_size // 2]):
-        entry.write_bytes(spoilt)
-        again = answer(prepare(scene.body, scene.probe_points, h=0.012), scene)
-        np.testing.assert_allclose(again.displacement, first.displacement, rtol=1e-9)
 
 
 def test_records_are_read_back_exactly_and_only_from_our_own_types():

@@ -18,14 +18,8 @@ from simple_model.load.spectrum import pressure_lines
 from skinwave.bodies import tissue
 from skinwave.bodies.absorbing_layer import layer_drag, layer_of
 from skinwave.bodies.build import build, operators
-from skinwave.models import parametric
-from skinwave.models.free_bodies import (
-    build_at,
-    geometry_shares,
-    meshed_materials,
-    reference_of,
-    solids_of,
-)
+from skinwave.models import free_bodies, parametric
+from skinwave.models.free_bodies import build_at
 from skinwave.models.free_keys import free_keys, values_at, with_values
 from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.models.reduced import answer as own_answer
@@ -39,18 +33,14 @@ SMALL = {"width": 0.04, "height": 0.04, "depth": 0.01}
 
 
 def scene_of(body, **changes):
-    tacton = Tacton(
-        am_frequency=140, duration=0.1,
-        trajectory=Trajectory(shape="circle", size=0.012, speed=5.0),
-    )  # fmt: skip
-    pressure = MovingPressure(tacton=tacton)
+    path = Trajectory(shape="circle", size=0.012, speed=5.0)
+    pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=path))
     probes = ((0.0, 0.0), (0.006, 0.0), (0.01, 0.004))
     return Scene(pressure=pressure, body=body, probes=probes, **changes)
 
 
 @pytest.fixture(scope="module")
 def slab():
-    """A small slab whose clamped sides send waves back."""
     return scene_of(Body(sides="clamped", **SMALL))
 
 
@@ -86,9 +76,8 @@ def test_lines_are_those_of_the_full_body_at_least_loss(slab, prepared):
         body = with_values(slab.body, prepared.keys, values)
         expected = full_lines(slab, body, strong)
         near = found[[np.argmin(np.abs(frequencies - f)) for f in strong]]
-        assert np.linalg.norm(near - expected, axis=1) == pytest.approx(
-            0, abs=0.01 * np.linalg.norm(expected, axis=1).min()
-        )
+        least = np.linalg.norm(expected, axis=1).min()
+        assert np.linalg.norm(near - expected, axis=1).max() < 0.01 * least
 
 
 def test_the_waveform_from_rest_is_that_of_the_materials_own_body(slab, prepared):
@@ -112,21 +101,15 @@ def test_the_offline_stage_is_cached(slab, tmp_path, monkeypatch):
     first = skinwave.prepare(few, free, 0.05, h=9e-3)
     monkeypatch.setattr(parametric, "reduce_affine", None)  # of no use from here on
     again = skinwave.prepare(few, free, 0.05, h=9e-3)
-    for function in (parametric.lines, lambda *given: vars(parametric.answer(*given)).values()):
-        for one, other in zip(
-            function(first, {VISCOSITY: 9.4}), function(again, {VISCOSITY: 9.4}), strict=True
-        ):
-            if isinstance(one, np.ndarray):
-                assert np.array_equal(one, other)
+    one, other = (parametric.answer(body, {VISCOSITY: 9.4}).values for body in (first, again))
+    np.testing.assert_array_equal(one, other)
     with pytest.raises(TypeError, match="not callable"):
         skinwave.prepare(few, {VISCOSITY: (9.0, 11.0)}, 0.05, h=9e-3)
 
 
 def test_springs_and_absorbing_layers_go_with_the_material():
-    soft = fem.Material(
-        density=1000, shear_modulus=30e3, poisson=0.45,
-        prony=(PronyTerm(modulus=10e3, time=1e-3),),
-    )  # fmt: skip
+    term = PronyTerm(modulus=10e3, time=1e-3)
+    soft = fem.Material(density=1000, shear_modulus=30e3, poisson=0.45, prony=(term,))
     other = replace(soft, density=900.0, shear_modulus=24e3)
     before, after = (Body(material=m, width=0.03, height=0.03, depth=0.01) for m in (soft, other))
     made = build(before, 1e-2)
@@ -135,7 +118,7 @@ def test_springs_and_absorbing_layers_go_with_the_material():
     rests = [tissue.support(body, mesh, outward, []).stiffness for body in (before, after)]
     keys = free_keys(before, {MODULUS: (20e3, 40e3)})
     on_springs = replace(made, support=tissue.support(before, mesh, outward, []))
-    solids = solids_of(reference_of(before, on_springs, keys), after)
+    solids = free_bodies.solids_of(free_bodies.reference_of(before, on_springs, keys), after)
     assert solids.materials == (other,)
     assert rests[1] == pytest.approx(solids.springs * rests[0])
     drags = [layer_drag(body, layer_of(body), mesh) for body in (before, after)]
@@ -144,7 +127,6 @@ def test_springs_and_absorbing_layers_go_with_the_material():
 
 
 def test_affine_sums_are_the_operators():
-    """Two layers under a coat of two, on springs and dashpots, in an absorbing layer."""
     upper = Layer(thickness=0.004, material="dermis")
     made = build(Body(material="fat", layers=(upper,), width=0.02, height=0.02, depth=0.01), 1e-2)
     prony = (PronyTerm(modulus=9e3, time=1e-3), PronyTerm(modulus=5e3, time=1e-2))
@@ -154,7 +136,7 @@ def test_affine_sums_are_the_operators():
         fem.Material(density=900, shear_modulus=30e3, poisson=0.48, loss_factor=0.1),
         fem.Material(density=1000, shear_modulus=20e3, poisson=0.4, loss_factor=0.2, prony=prony),
     )
-    assert meshed_materials(made) == tuple(made.material.values())
+    assert free_bodies.meshed_materials(made) == tuple(made.material.values())
     facets = made.mesh.facets["sides"]
     shares = np.random.default_rng(0).random((2, 6 * len(facets)))
     made = replace(
@@ -162,7 +144,6 @@ def test_affine_sums_are_the_operators():
         coat=fem.Coat(materials=materials[:2], thicknesses=(1e-4, 3e-4)),
         support=fem.Support(facets=facets, stiffness=1e6 * shares[0], absorbed=shares[1]),
     )  # fmt: skip
-    assert made.drag is not None
     assert made.drag.any()
     expected = operators(made)
     affine = assemble_affine(
@@ -181,31 +162,7 @@ def test_affine_sums_are_the_operators():
     assert abs(summed - stiff).max() < 1e-12 * abs(stiff).max()
 
 
-LAYERED = Body(
-    layers=(Layer(thickness=0.003, material="dermis"),), sides="clamped",
-    width=0.024, height=0.024, depth=0.01,
-)  # fmt: skip
-THICK = {"body.layers.0.thickness_mm": (2.0, 4.0), "body.thickness_mm": (8.0, 12.0)}
-
-
-def test_matrices_of_a_stretched_body_are_sums_over_known_geometries():
-    layered = replace(LAYERED, kind="disc", sides="absorbing")
-    keys = free_keys(layered, THICK)
-    bodies = parametric._range(layered, keys, 5e-3)
-    assert len(bodies.geometries) == 5  # 1, two thicknesses and their inverses
-    at = [key.share(value) for key, value in zip(keys, (2.7, 11.0), strict=True)]
-    shares = geometry_shares(bodies, bodies.body(at))
-    assert shares.sum() == pytest.approx(1)
-    wanted = operators(build_at(bodies, at))
-    known = [operators(build_at(bodies, each)) for each in bodies.geometries]
-    for one in "KCM":
-        A = getattr(wanted, one)
-        found = sum(s * getattr(each, one) for s, each in zip(shares, known, strict=True))
-        assert abs(found - A).max() < 1e-9 * abs(A).max()
-
-
 def test_the_ends_of_a_range_of_thickness_are_as_accurate_as_its_middle():
-    """Vectors of one thickness alone change the others little, and are off by 3 % there."""
     thickness = 12.0
     tacton = Tacton(am_frequency=200, trajectory=Trajectory(shape="circle", size=0.01, speed=6.0))
     body = Body(sides="clamped", **(SMALL | {"depth": 1e-3 * thickness}))
@@ -222,7 +179,6 @@ def test_the_ends_of_a_range_of_thickness_are_as_accurate_as_its_middle():
 
 
 def of_one_line(parts, outputs):
-    """Equations (q, r, r) of one line with forces of 1 and outputs (p, r)."""
     q, r, _ = parts.shape
     return AffineModel(
         terms=(("stiffness", 0),) * q, parts=parts[None], outputs=outputs[None], basis=np.eye(r),
@@ -238,23 +194,14 @@ def test_ranges_that_few_states_do_not_span_are_refused():
         line_bases(model, at, np.ones((30, 1)), 1e-6, lambda x: None)
 
 
-@pytest.mark.parametrize(
-    "free",
-    [
-        {},
-        {"body.size_x_mm": (30, 40)},
-        {"body.layers.0.thickness_mm": (1.0, 2.0)},
-        {MODULUS: (2e4, 1e4)},
-        {MODULUS: (-1e4, 1e4)},
+def test_keys_that_cannot_be_free_are_refused(slab):
+    for free in (
+        {}, {"body.size_x_mm": (30, 40)}, {"body.layers.0.thickness_mm": (1.0, 2.0)},
+        {MODULUS: (2e4, 1e4)}, {MODULUS: (-1e4, 1e4)},
         {"body.material.prony.0.modulus_pa": (1e3, 2e3)},
-    ],
-)
-def test_keys_that_cannot_be_free_are_refused(slab, free):
-    with pytest.raises(ValueError, match=next(iter(free), "free")):
-        free_keys(slab.body, free)
-
-
-def test_thicknesses_that_no_mesh_follows_are_refused(slab):
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=next(iter(free), "free")):
+            free_keys(slab.body, free)
     with pytest.raises(ValueError, match="finger"):
         free_keys(BODIES["fingertip"], {"body.thickness_mm": (13.0, 15.0)})
     strain = replace(slab, quantity="largest_shear_strain", depth=1e-3)
@@ -279,7 +226,6 @@ def test_scenes_that_sums_of_matrices_cannot_solve_are_refused(slab):
     constant = replace(slab.pressure, tacton=Tacton(duration=0.01))
     with pytest.raises(ValueError, match="no oscillating line"):
         skinwave.prepare(replace(slab, pressure=constant), RANGES)
-    mounting = 'edges = ["left", "right"]'
-    open_sheet = f"[body]\npreset = 'paper-sheet-loose'\n[body.mounting]\n{mounting}"
+    open_sheet = "[body]\npreset='paper-sheet-loose'\n[body.mounting]\nedges=['left', 'right']"
     with pytest.raises(ValueError, match="frame"):
         skinwave.prepare(skinwave.loads(open_sheet), {"body.material.density_kg_m3": (700, 900)})

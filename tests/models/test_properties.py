@@ -10,16 +10,7 @@ from hypothesis import strategies as st
 
 import fem
 import meshes
-from meshes import TetMesh
-from simple_model import (
-    SHAPES,
-    MovingPressure,
-    Rhythm,
-    Signal,
-    Tacton,
-    Trajectory,
-    flat_body,
-)
+from simple_model import SHAPES, MovingPressure, Rhythm, Signal, Tacton, Trajectory, flat_body
 from simple_model.layers.compliance import half_space, slab
 from simple_model.load.focus import FOCI
 from simple_model.load.rhythm import ROLES
@@ -33,12 +24,19 @@ from skinwave.models.options import SolveOptions
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute, simulate
 
+seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
+held = st.sampled_from([(b, s) for b in CONDITIONS for s in CONDITIONS if "clamped" in (b, s)])
+SMALL = Body(width=0.03, height=0.03, depth=0.006, sides="clamped")
+SHEET = replace(BODIES["paper-sheet-loose"], width=0.03, height=0.03)
+WATCHED = ((0.0, 0.0), (0.006, 0.003))
+SLOW = {"density": 1000.0, "shear_modulus": 9e3, "poisson": 0.3, "viscosity": 0.05}
+REACH = 0.016  # m of a focus, beyond which it is below a thousandth
+
 
 def numbers(low, high):
     return st.floats(low, high, allow_nan=False)
 
 
-seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 frequencies = st.just(0.0) | numbers(5.0, 400.0)
 materials = st.builds(
     fem.Material,
@@ -61,28 +59,19 @@ sized = st.builds(
 
 @st.composite
 def recordings(draw):
-    """Paths with times of their own, which may jump."""
     points = draw(places)
-    steps = draw(
-        st.lists(
-            st.just(0.0) | numbers(1e-3, 5e-3), min_size=len(points) - 1, max_size=len(points) - 1
-        )
-    )
+    n, step = len(points), st.just(0.0) | numbers(1e-3, 5e-3)
+    steps = draw(st.lists(step, min_size=n - 1, max_size=n - 1))
     times = np.concatenate([[0.0], np.cumsum(steps) + 1e-3 * (np.arange(len(steps)) > -1)])
-    levels = draw(st.just([]) | st.lists(numbers(0, 1), min_size=len(points), max_size=len(points)))
-    return Trajectory(
-        shape="recorded", points=tuple(points), times=tuple(times.tolist()),
-        levels=tuple(levels), hold=draw(st.booleans()),
-    )  # fmt: skip
+    levels = draw(st.just([]) | st.lists(numbers(0, 1), min_size=n, max_size=n))
+    given = {"times": tuple(times.tolist()), "levels": tuple(levels), "hold": draw(st.booleans())}
+    return Trajectory(shape="recorded", points=tuple(points), **given)
 
 
 @st.composite
 def polylines(draw):
-    """Paths through points, drawn at most 300 times a second."""
-    points = tuple(draw(places))
-    path = Trajectory(
-        shape="polyline", points=points, sweep=draw(st.sampled_from(SWEEPS)), speed=0.0
-    )
+    points, sweep = tuple(draw(places)), draw(st.sampled_from(SWEEPS))
+    path = Trajectory(shape="polyline", points=points, sweep=sweep, speed=0.0)
     return replace(path, speed=draw(numbers(0, 300)) * path.length)
 
 
@@ -114,9 +103,7 @@ tactons = st.builds(
 )
 every_tacton = (
     tactons
-    | st.builds(
-        replace, tactons, rhythm=st.none() | rhythms, signal=st.none() | signals
-    )
+    | st.builds(replace, tactons, rhythm=st.none() | rhythms, signal=st.none() | signals)
     | st.builds(
         Tacton,
         am_frequency=frequencies,
@@ -138,7 +125,6 @@ papers = st.builds(
     fem.from_young, density=numbers(300, 1500), young=numbers(1e8, 1e10), poisson=numbers(0, 0.45),
     loss_factor=numbers(0.02, 0.1),
 )  # fmt: skip
-held = st.sampled_from([(b, s) for b in CONDITIONS for s in CONDITIONS if "clamped" in (b, s)])
 
 
 @st.composite
@@ -149,19 +135,12 @@ def scenes(draw):
     width, height = draw(numbers(0.02, 0.04)), draw(numbers(0.02, 0.04))
     depth = draw(numbers(0.003, 0.01) if kind == "slab" else numbers(1e-4, 5e-4))
     solids = st.just("paper") | papers if kind == "sheet" else st.just("palm") | materials
-    body = Body(
-        kind=kind, material=draw(solids),
-        width=width, height=height, depth=depth, base=base, sides=sides,
-    )  # fmt: skip
+    size = {"width": width, "height": height, "depth": depth}
+    body = Body(kind=kind, material=draw(solids), base=base, sides=sides, **size)
     share = st.sampled_from((0.0, 0.25, -0.5, 0.5)) | numbers(-0.5, 0.5)
     points = draw(st.lists(st.tuples(share, share), min_size=1, max_size=4))
     probes = tuple((x * width, y * height) for x, y in points)
     return Scene(name=draw(st.text()), pressure=draw(pressures), body=body, probes=probes)
-
-
-SMALL = Body(width=0.03, height=0.03, depth=0.006, sides="clamped")
-SHEET = replace(BODIES["paper-sheet-loose"], width=0.03, height=0.03)
-WATCHED = ((0.0, 0.0), (0.006, 0.003))
 
 
 def small_scene(tacton, body=SMALL, **pressure):
@@ -170,9 +149,7 @@ def small_scene(tacton, body=SMALL, **pressure):
 
 
 def body_for(model):
-    """A small body that a model takes."""
-    slab = small_scene(Tacton())
-    return SMALL if takes(named(model), slab) else SHEET
+    return SMALL if takes(named(model), small_scene(Tacton())) else SHEET
 
 
 @pytest.mark.parametrize(
@@ -181,18 +158,16 @@ def body_for(model):
 @settings(max_examples=3)
 @given(tactons, numbers(0.01, 100))
 def test_every_linear_model_is_linear_in_the_pressure(model, tacton, factor):
-    model_options = {"h": 0.01, "dt": 1e-3 if tacton.duration > 2e-3 else None}
+    given = {"h": 0.01, "dt": 1e-3 if tacton.duration > 2e-3 else None, "tolerance": 0.3}
     body = body_for(model)
-    once = compute(
-        small_scene(tacton, body, peak_pressure=10.0), model, tolerance=0.3, **model_options
-    ).displacement
-    scaled = small_scene(tacton, body, peak_pressure=10.0 * factor)
-    many = compute(scaled, model, tolerance=0.3, **model_options).displacement
+    once, many = (
+        compute(small_scene(tacton, body, peak_pressure=p), model, **given).displacement
+        for p in (10.0, 10.0 * factor)
+    )
     np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
 
 
 def pushed_and_read(material, rng):
-    """A small body, and the operator that reads, or pushes, two places of its surface."""
     mesh = meshes.block((0.03, 0.02, 0.01), 0.005)
     places = rng.uniform(-0.5, 0.5, (2, 2)) * [0.03, 0.02]
     operators = fem.assemble(mesh, material, absorbing="sides")
@@ -207,22 +182,15 @@ def test_responses_are_reciprocal(material, rng, hertz):
     assert abs(there[1] - here[0]) < 1e-9 * np.sqrt(abs(there[0] * here[1]))
 
 
-SLOW = {"density": 1000.0, "shear_modulus": 9e3, "poisson": 0.3, "viscosity": 0.05}
-REACH = 0.016  # m of a focus, beyond which it is below a thousandth
-
-
 @settings(max_examples=6)
 @given(numbers(0.06, 0.09), frequencies, st.sampled_from(("half-space", "slab")))
 def test_no_wave_of_an_endless_body_arrives_before_it_can(distance, am, kind):
-    body = (
-        half_space(fem.Material(**SLOW))
-        if kind == "half-space"
-        else slab(fem.Material(**SLOW), 0.02)
-    )
+    solid = fem.Material(**SLOW)
+    body = half_space(solid) if kind == "half-space" else slab(solid, 0.02)
     load = MovingPressure(tacton=Tacton(am_frequency=am, duration=0.05))
     times = np.arange(500) / 1e4
     x = np.abs(flat_body(body, load, [[distance, 0.0]], times).displacement[:, 0])
-    arrival = (distance - REACH) / fem.Material(**SLOW).pressure_speed
+    arrival = (distance - REACH) / solid.pressure_speed
     assert x[times < arrival].max() < 0.01 * x.max()
 
 
@@ -231,11 +199,9 @@ def test_no_wave_of_an_endless_body_arrives_before_it_can(distance, am, kind):
 def test_no_wave_of_a_mesh_arrives_before_it_can(distance, am):
     material = fem.Material(**SLOW | {"viscosity": 1.0})
     body = Body(material=material, width=0.112, height=0.02, depth=0.01, sides="clamped")
-    tacton = Tacton(am_frequency=am, duration=0.03)
+    load = MovingPressure(tacton=Tacton(am_frequency=am, duration=0.03))
+    scene = Scene(pressure=load, body=body, probes=((0, 0), (distance, 0)))
     for model in ("fem", "fem-transient"):
-        scene = Scene(
-            pressure=MovingPressure(tacton=tacton), body=body, probes=((0, 0), (distance, 0))
-        )
         x = np.abs(compute(scene, model, tolerance=0.05, h=0.005, dt=2e-4).displacement)
         times = np.arange(len(x)) / 1e4
         arrival = (distance - REACH) / material.pressure_speed
@@ -247,7 +213,6 @@ def test_no_wave_of_a_mesh_arrives_before_it_can(distance, am):
 @settings(max_examples=4)
 @given(tactons)
 def test_a_later_load_does_not_change_an_earlier_motion(model, tacton):
-    """The load lasts as long as its Tacton, so that the longer one goes on pushing."""
     tacton = replace(tacton, duration=max(tacton.duration, 0.005))
     longer = replace(tacton, duration=2 * tacton.duration)
     short, long = (
@@ -263,17 +228,14 @@ def bodies(draw):
     """A shaken block, straight or bowed, in four- or ten-node tetrahedra."""
     rng, order = draw(seeds), draw(st.sampled_from((1, 2)))
     mesh = meshes.block((0.03, 0.02, 0.01), 0.006, order=order)
-    shaken = mesh.points + rng.uniform(-3e-4, 3e-4, mesh.points.shape)
-    return TetMesh(points=shaken, tets=mesh.tets, facets=mesh.facets)
+    return replace(mesh, points=mesh.points + rng.uniform(-3e-4, 3e-4, mesh.points.shape))
 
 
 @given(bodies(), materials, seeds)
 def test_a_response_moves_and_rotates_with_its_body(mesh, material, rng):
     R = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     R *= np.linalg.det(R)
-    moved = TetMesh(
-        points=mesh.points @ R.T + rng.uniform(-1, 1, 3), tets=mesh.tets, facets=mesh.facets
-    )
+    moved = replace(mesh, points=mesh.points @ R.T + rng.uniform(-1, 1, 3))
     force = rng.standard_normal(mesh.points.shape)
     u = fem.static(fem.assemble(mesh, material), force.ravel())
     turned = fem.static(fem.assemble(moved, material), (force @ R.T).ravel())

@@ -15,9 +15,8 @@ from skinwave.models.meshed import axes_of_probes, mirrored_axes
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import SURFACE, Scene
 
-CIRCLE = Tacton(
-    am_frequency=140, duration=0.1, trajectory=Trajectory(shape="circle", size=0.02, speed=8)
-)
+PATH = Trajectory(shape="circle", size=0.02, speed=8)
+CIRCLE = Tacton(am_frequency=140, duration=0.1, trajectory=PATH)
 SLAB = Body(kind="slab", width=0.06, height=0.05, depth=0.01, material="palm")
 SHEET = Body(kind="sheet", width=0.08, height=0.06, material="paper", base="free", sides="clamped",
              depth=1e-4)  # fmt: skip
@@ -26,7 +25,6 @@ ON_X = ((0.0, 0.0), (0.007, 0.0), (-0.012, 0.0))
 
 
 def motions(monkeypatch, body, probes, h):
-    """Return responses of the part that the probes need, and of the whole body."""
     scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=probes), []
     for axes in (axes_of_probes, lambda probes, among: ""):
         monkeypatch.setattr(meshed, "axes_of_probes", axes)
@@ -72,7 +70,6 @@ def test_asymmetric_bodies_have_no_axes():
 
 
 def test_half_of_a_coarse_disc_is_factorised():
-    """Its matrix of 504 dofs is nearly dense, of which blocks of rows made PARDISO crash."""
     disc = Body(kind="disc", width=0.03, height=0.03, depth=0.01, material="ecoflex")
     K = operators(build(disc, 0.0106, "y")).K
     b = np.ones(K.shape[0])

@@ -40,13 +40,11 @@ WARNED = {
 
 
 def options_of(arguments):
-    """Return the options of the command line for arguments of Python."""
     words = ["--model", arguments["model"]]
     return words + (["--element-size", f"{1e3 * arguments['h']:g}"] if "h" in arguments else [])
 
 
 def page_warnings(path):
-    """Return the sentences in the banner of a page."""
     banner = path.read_text().split('<div class="warning"')[1].split("</div>")[0]
     return [html.unescape(p.split(".</p>")[0]) for p in banner.split("<p>Take care: ")[1:]]
 
@@ -91,7 +89,6 @@ def test_a_row_of_a_sweep_has_the_same_warnings(name, tmp_path, monkeypatch):
 
 
 def with_probe_twice(text):
-    """Return the scene with one probe given twice, which only a response warns of."""
     return text.replace("[5, 0]]", "[5, 0], [5, 0]]")
 
 
@@ -142,7 +139,6 @@ def test_implausible_densities_and_repeated_probes_are_warned_of():
 
 
 def response_with(deflection, scene, model="fem"):
-    """Return a response of a scene with a largest deflection in metre."""
     times = np.arange(3) / 1e4
     motion = np.outer([0.0, -1.0, 0.5], np.ones(len(scene.probes))) * deflection
     return Response(model=model, times=times, probes=scene.probe_points, values=motion)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from corpus import FREE, SHORT
 
 from bench.plans import MOST, stated_and_true
 from simple_model import Trajectory
@@ -14,26 +15,39 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
 from skinwave.planning.estimates import side_reflections
 from skinwave.planning.plan import plan
-from skinwave.planning.refinement import (
-    SizeController,
-    comparison_size,
-    mesh_error,
-    refine,
-)
+from skinwave.planning.refinement import SizeController, refine
 from skinwave.planning.simulate import compute
 from skinwave.results.comparison import compare
 from skinwave.scene.scene import Body, Layer
 
-SHORT = """
-name = "short"
+LOSSLESS = (
+    "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.4999, viscosity_pa_s=VISCOUS}"
+)
+SILICONE = LOSSLESS.replace("VISCOUS", "3")
+OVERDAMPED = LOSSLESS.replace("25e3, poisson=0.4999", "1e3, poisson=0.499").replace("VISCOUS", "50")
+ADRIFT = """
+size_x_mm = 30
+base = "free"
+sides = {left = "absorbing", right = "free", front = "free", back = "free"}
+"""
+LAYERS = """
 [tacton]
-am_frequency_hz = 140
-duration_s = 0.05
+am_frequency_hz = 136
+duration_s = 0.041
 [body]
-size_x_mm = 60
-size_y_mm = 60
+size_x_mm = 21
+size_y_mm = 24.4
+thickness_mm = 8.5
+sides = "clamped"
+material = {density_kg_m3 = 1000, shear_modulus_pa = 20500, poisson = 0.49, viscosity_pa_s = 6.4}
+[[body.layers]]
+thickness_mm = 1.8
+material = {density_kg_m3 = 1000, shear_modulus_pa = 23400, poisson = 0.4999, viscosity_pa_s = 4.8}
+[[body.layers]]
+thickness_mm = 1.8
+material = {density_kg_m3 = 1000, shear_modulus_pa = 26300, poisson = 0.49, viscosity_pa_s = 7.5}
 [probes]
-points_mm = [[0, 0], [5, 0]]
+points_mm = [[0.8, 7.6], [1.1, 4.4], [8.0, 6.2]]
 """
 
 
@@ -41,11 +55,6 @@ def test_the_plan_prefers_wavenumber_integrals():
     assert plan(loads(SHORT)).model == "flat-body"
     assert plan(loads("[body]\nkind = 'none'")).model == "point-kernel"
     assert plan(loads("[body]\nthickness_mm = inf")).model == "flat-body"
-
-
-LOSSLESS = (
-    "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.4999, viscosity_pa_s=VISCOUS}"
-)
 
 
 def test_a_slab_without_loss_is_planned():
@@ -67,13 +76,8 @@ def test_a_slab_without_loss_is_planned():
 )
 def test_the_plan_takes_elements_where_sides_reflect_or_the_focus_has_lobes(text):
     text = "[tacton]\nduration_s = 0.1\n" + text + "\n[probes]\npoints_mm = [[0, 0], [5, 0]]"
-    loose, tight = (
-        plan(loads(text), SolveOptions(tolerance=0.3)),
-        plan(loads(text), SolveOptions(tolerance=0.1)),
-    )
+    loose, tight = (plan(loads(text), SolveOptions(tolerance=x)) for x in (0.3, 0.1))
     assert loose.model == tight.model == "fem"
-    assert loose.h is not None
-    assert tight.h is not None
     assert tight.h <= loose.h
     assert loose.error <= 0.3
     assert tight.error <= 0.1
@@ -81,7 +85,6 @@ def test_the_plan_takes_elements_where_sides_reflect_or_the_focus_has_lobes(text
 
 
 def test_a_long_steady_pattern_needs_no_start():
-    """The transient is followed until it has nearly died out."""
     scene = loads(SHORT.replace("duration_s = 0.05", "duration_s = 0.5"))
     for shape in ("point", "circle"):
         path = Trajectory(shape=shape, size=0.02, speed=9.0)
@@ -104,9 +107,7 @@ def test_a_long_steady_pattern_needs_no_start():
 
 
 def test_sides_without_reflections_need_no_elements():
-    lossy = (
-        "material = {density_kg_m3=1000, shear_modulus_pa=10e3, poisson=0.499, viscosity_pa_s=9}"
-    )
+    lossy = LOSSLESS.replace("25e3, poisson=0.4999", "10e3, poisson=0.499").replace("VISCOUS", "9")
     text = f"[tacton]\nam_frequency_hz = 200\n[body]\nsides = 'free'\n{lossy}"
     for tolerance, model in ((0.12, "flat-body-harmonic"), (0.08, "flat-body")):
         required = plan(loads(text), SolveOptions(tolerance=tolerance))
@@ -116,41 +117,17 @@ def test_sides_without_reflections_need_no_elements():
 
 @pytest.mark.parametrize(
     ("material", "width", "duration", "h", "low"),
-    [("silicone", 100, 0.03, 0.005, 0.15), ("overdamped", 80, 0.02, 0.004, 0.25)],
+    [(SILICONE, 100, 0.03, 0.005, 0.15), (OVERDAMPED, 80, 0.02, 0.004, 0.25)],
 )
 def test_the_estimated_reflections_bound_the_true_ones(material, width, duration, h, low):
-    """A load that only begins has no reflected line, and viscous stress no front."""
-    modulus, poisson, viscosity = {"silicone": (25e3, 0.4999, 3), "overdamped": (1e3, 0.499, 50)}[
-        material
-    ]
     scene = loads(
-        f"""
-[tacton]
-duration_s = {duration}
-[body]
-sides = "free"
-size_x_mm = {width}
-size_y_mm = {width}
-material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
-             viscosity_pa_s={viscosity}}}
-""".replace(",\n", ",")
+        f"[tacton]\nduration_s = {duration}\n[body]\nsides = 'free'\nsize_x_mm = {width}\n"
+        f"size_y_mm = {width}\n{material}"
     )
     returned = side_reflections(scene)
     found = compare(compute(scene, "fem", h=h), compute(scene, "flat-body")).relative_l2
     assert low < found.max() < 1.5 * returned
     assert returned < 6 * found.max()
-
-
-def test_refinement_ends_at_the_finest_mesh_with_its_error(monkeypatch):
-    """Also if the step to it is a short one."""
-    monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.1)
-    scene = loads(
-        "[tacton]\nduration_s = 0.05\n[body]\nkind = 'sheet'\nsize_x_mm = 60\nsize_y_mm = 60\n"
-        "[probes]\npoints_mm = [[0, 0]]"
-    )
-    found = refine(scene, scene.body, SolveOptions(tolerance=0.01))
-    assert found.h == pytest.approx(2.1 * default_size(scene.body))
-    assert found.error > 0.01
 
 
 def test_a_quantity_that_converges_at_the_order_of_the_controller_is_extrapolated_exactly():
@@ -170,29 +147,12 @@ def test_a_quantity_that_converges_at_the_order_of_the_controller_is_extrapolate
     assert controller.nearest(sizes, 0.1, 1.0, 0.01) == 0.0625  # by the largest factor at most
 
 
-def test_the_error_of_a_mesh_without_another_is_1_or_unknown():
-    body = loads("[body]\nkind = 'slab'").body
-    quantities, sizes = (np.ones((3, 1)), np.full((3, 1), 1.1)), (comparison_size(body, 5e-3), 5e-3)
-    assert 0.01 < mesh_error(body, sizes, quantities, same=False) < 0.5
-    assert mesh_error(body, sizes, quantities, same=True) == 1.0
-    of_file = replace(body, kind="mesh", file="hand.msh")
-    assert np.isnan(mesh_error(of_file, sizes, quantities, same=True))
-
-
 @pytest.mark.parametrize("h", [0.0075, 0.0049])
 def test_the_expected_error_of_a_mesh_is_near_the_true_one(h):
-    """Also where it has as many layers as the next coarser one, or twice as many."""
     scene = loads(SHORT.replace("size_x_mm = 60\nsize_y_mm = 60", "size_x_mm = 40\nsize_y_mm = 40"))
     found = refine(scene, scene.body, SolveOptions(tolerance=0.05, h=h))
     true = compare(answer(found.prepared, scene), compute(scene, "flat-body")).relative_l2.max()
     assert 0.4 < found.error / true < 2.5
-
-
-ADRIFT = """
-size_x_mm = 30
-base = "free"
-sides = {left = "absorbing", right = "free", front = "free", back = "free"}
-"""
 
 
 def test_an_unconstrained_body_is_warned_of():
@@ -217,7 +177,6 @@ def test_meshes_of_a_palm_resolve_its_layers():
 
 
 def test_a_layer_that_no_mesh_of_a_palm_resolves_is_refused():
-    """Whatever the elements: smaller ones are more than the mesher may make."""
     fat = Layer(thickness=3e-3, material="fat")
     thin = Body(kind="palm", layers=(fat, Layer(thickness=0.3e-3, material="epidermis")))
     for do in (check_mesh, build):
@@ -226,11 +185,9 @@ def test_a_layer_that_no_mesh_of_a_palm_resolves_is_refused():
 
 
 def test_a_wide_body_is_cut_where_reflections_are_negligible():
-    wide = "[focus]\nprofile = 'main_lobe'\n[body]\nsize_x_mm = 600\nsize_y_mm = 40"
-    probes = "\n[probes]\npoints_mm = [[0, 0]]"
-    required = plan(
-        loads("[tacton]\nam_frequency_hz = 200\n" + wide + probes), SolveOptions(tolerance=0.4)
-    )
+    text = "[tacton]\nam_frequency_hz = 200\n[focus]\nprofile = 'main_lobe'\n[body]\n"
+    text += "size_x_mm = 600\nsize_y_mm = 40\n[probes]\npoints_mm = [[0, 0]]"
+    required = plan(loads(text), SolveOptions(tolerance=0.4))
     assert required.body.width < 0.3
     assert required.body.height == 0.04
     assert "extent" in {row.what for row in required.rows}
@@ -242,19 +199,8 @@ def test_a_wide_body_is_cut_where_reflections_are_negligible():
      ("shape='circle'\nsize_mm=20\nspeed_m_per_s=5", "")],
 )  # fmt: skip
 def test_a_symmetric_scene_is_halved(path, axes):
-    text = f"""
-[tacton]
-am_frequency_hz = 140
-duration_s = 0.05
-{path}
-[body]
-sides = "clamped"
-size_x_mm = 60
-size_y_mm = 60
-[probes]
-points_mm = [[0, 0], [-5, 3]]
-"""
-    scene = loads(text)
+    text = SHORT.replace("[body]", f'{path}\n[body]\nsides = "clamped"')
+    scene = loads(text.replace("[5, 0]", "[-5, 3]"))
     required = plan(scene, SolveOptions(tolerance=0.3, model="fem"))
     assert required.symmetry == axes
     assert required.error <= 0.3
@@ -269,9 +215,7 @@ points_mm = [[0, 0], [-5, 3]]
 def test_meshes_are_refined_until_they_meet_the_tolerance():
     text = "[tacton]\nam_frequency_hz = 80\nduration_s = 0.1\n[body]\nkind = 'sheet'\n"
     scene = loads(text + "[focus]\npeak_pressure_pa = 0.1\n[probes]\npoints_mm = [[0, 0], [5, 0]]")
-    loose, tight = (
-        plan(scene, SolveOptions(tolerance=tolerance, model="fem")) for tolerance in (0.2, 0.04)
-    )
+    loose, tight = (plan(scene, SolveOptions(tolerance=x, model="fem")) for x in (0.2, 0.04))
     assert tight.h < loose.h
     finer = answer(prepare(scene.body, scene.probe_points, h=1.6e-3, symmetry="xy"), scene)
     for required in (loose, tight):
@@ -297,44 +241,8 @@ def test_errors_above_the_tolerance_are_warned_of():
         assert any(" %" in warning for warning in warnings), part
 
 
-FREE = """
-[tacton]
-am_frequency_hz = 226
-duration_s = 0.09
-[body]
-size_x_mm = 29.3
-size_y_mm = 20
-thickness_mm = 9.9
-base = "free"
-sides = "clamped"
-material = {density_kg_m3 = 1000, shear_modulus_pa = 30100, poisson = 0.4999, viscosity_pa_s = 4.3}
-[probes]
-points_mm = [[-5.3, 8.7], [-0.5, -1.1], [-7.7, -1.3]]
-"""
-LAYERS = """
-[tacton]
-am_frequency_hz = 136
-duration_s = 0.041
-[body]
-size_x_mm = 21
-size_y_mm = 24.4
-thickness_mm = 8.5
-sides = "clamped"
-material = {density_kg_m3 = 1000, shear_modulus_pa = 20500, poisson = 0.49, viscosity_pa_s = 6.4}
-[[body.layers]]
-thickness_mm = 1.8
-material = {density_kg_m3 = 1000, shear_modulus_pa = 23400, poisson = 0.4999, viscosity_pa_s = 4.8}
-[[body.layers]]
-thickness_mm = 1.8
-material = {density_kg_m3 = 1000, shear_modulus_pa = 26300, poisson = 0.49, viscosity_pa_s = 7.5}
-[probes]
-points_mm = [[0.8, 7.6], [1.1, 4.4], [8.0, 6.2]]
-"""
-
-
 @pytest.mark.parametrize(("text", "tolerance"), [(FREE, 0.1), (LAYERS, 0.05)])
 def test_stated_errors_of_small_bodies_are_true(text, tolerance):
-    """Whose short sides have few cells, and with jumps of material."""
     stated, true = stated_and_true(loads(text), tolerance)
     assert true < MOST * stated
     assert stated < tolerance

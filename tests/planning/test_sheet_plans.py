@@ -29,7 +29,6 @@ STRETCHED = Body(
 
 
 def test_modes_from_rest_agree_with_elements():
-    """A viscous loss is the same of a mode and of elements."""
     circle = Trajectory(shape="circle", size=0.012, speed=3.0)
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=circle))
     scene = Scene(pressure=pressure, body=STRETCHED, probes=((0.0, 0.0), (0.01, 0.005)))
@@ -53,7 +52,6 @@ def test_modes_from_rest_agree_with_elements():
      ("210, 148", "left, right", "in a frame, not one")],
 )  # fmt: skip
 def test_sheets_in_frames_and_between_edges_are_planned_and_run(size, edges, why):
-    """A4 in a frame, and A5 between two edges with air, of which elements have none."""
     (x, y), held = size.split(", "), edges.split(", ")
     scene = loads(
         "[tacton]\nam_frequency_hz = 140\nshape = 'circle'\nsize_mm = 20\nspeed_m_per_s = 12\n"
@@ -72,22 +70,17 @@ def test_sheets_in_frames_and_between_edges_are_planned_and_run(size, edges, why
 
 
 def test_curled_sheets_other_bodies_and_small_tolerances_stay_with_elements():
-    curled = replace(BODIES["a4-sheet"], mounting=Mounting(curl_x=1e-3))
-    for body, tolerance in (
-        (BODIES["skin-slab"], 0.05),
-        (curled, 0.05),
-        (BODIES["a4-sheet"], 5e-3),
-    ):
+    sheet = BODIES["a4-sheet"]
+    curled = replace(sheet, mounting=Mounting(curl_x=1e-3))
+    for body, tolerance in ((BODIES["skin-slab"], 0.05), (curled, 0.05), (sheet, 5e-3)):
         scene = Scene(pressure=MovingPressure(tacton=Tacton()), body=body)
         assert why_modes(scene, tolerance) == ""
 
 
 @pytest.mark.parametrize(
-    ("pressure", "model"),
-    [(5.0, "plate-modes-nonlinear"), (0.1, FROM_REST.name)],
+    ("pressure", "model"), [(5.0, "plate-modes-nonlinear"), (0.1, FROM_REST.name)]
 )
 def test_a_sheet_that_stretches_is_planned_as_one(pressure, model):
-    """Under 5 Pa this sheet deflects by a fifth of its thickness; linear it would be 10 % off."""
     load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05), peak_pressure=pressure)
     scene = Scene(pressure=load, body=BODIES["paper-sheet-loose"], probes=((0.01, 0.005),))
     assert plan(scene).model == model
@@ -116,7 +109,6 @@ def test_the_cure_of_a_stretching_warning_can_be_computed(mounting):
     (said,) = stretching(scene, response, 0.05)
     (cure,) = cures_for(scene, named(NONLINEAR[0]))
     assert cure.words in said
-    assert cure.model in said
     assert np.isfinite(compute(cure.scene, cure.model).values).all()
 
 

@@ -44,9 +44,7 @@ points_mm = [[0, 0], [5, 5]]
 
 
 def stated(scene, steady, rest, **given):
-    """Stated error of a steady state, its relative difference from rest at the worst probe, and its
-    warnings.
-    """
+    """Stated error, relative difference from rest at the worst probe, and warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkinwaveWarning)
         found = simulate(scene, steady, **given)
@@ -77,7 +75,6 @@ def test_wavenumber_integrals_state_the_start_of_the_quantity(quantity):
 
 @pytest.mark.parametrize("quantity", ["velocity", "acceleration"])
 def test_wavenumber_integrals_state_a_jump_above_their_band(quantity):
-    """Beside eight times the band."""
     scene = loads(f'{LAYER}quantity = "{quantity}"')
     found = compute(scene, "flat-body")
     times = found.times[1] / 16 * np.arange(16 * len(found.times))
@@ -91,13 +88,11 @@ def test_elements_state_the_start_of_the_quantity():
     scene = loads(f'{BLOCK}quantity = "acceleration"')
     error, left, _ = stated(scene, "fem-harmonic", "fem", h=6e-3)
     assert left > 0.1
-    assert error - plan(scene, SolveOptions(model="fem", h=6e-3)).error == pytest.approx(
-        left, rel=0.05
-    )
+    of_mesh = plan(scene, SolveOptions(model="fem", h=6e-3)).error
+    assert error - of_mesh == pytest.approx(left, rel=0.05)
 
 
 def test_the_error_of_the_start_is_that_of_the_requested_times():
-    """Late, it has died out; at first, there is nothing else."""
     scene = loads(LAYER.replace("0.03", "0.5"))
     whole, *parts = (
         stated(scene, "flat-body-harmonic", "flat-body", times=np.arange(*span) / 1e4)
@@ -109,10 +104,8 @@ def test_the_error_of_the_start_is_that_of_the_requested_times():
 
 
 def test_the_drift_of_an_unconstrained_body_is_in_its_error():
-    ends = (
-        'base = "free"\nsides = {left = "absorbing", right = "free", front = "free", back = "free"}'
-    )
-    scene = loads(BLOCK.replace("[probes]", f"{ends}\n[probes]"))
+    free = "base = 'free'\nsides = {left='absorbing', right='free', front='free', back='free'}"
+    scene = loads(BLOCK.replace("[probes]", f"{free}\n[probes]"))
     error, left, _ = stated(scene, "fem-harmonic", "fem", h=6e-3)
     assert 0.9 < left < 1.2
     assert left < error + 0.01 < 2.0

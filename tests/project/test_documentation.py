@@ -18,7 +18,6 @@ OTHERS = [page for page in PAGES if page.stem not in WRITTEN]
 
 
 def code_blocks(language, pages=PAGES):
-    """Code blocks of a language, by page."""
     pattern = re.compile(rf"```{language}\n(.*?)```", re.DOTALL)
     found = {page: pattern.findall(page.read_text("utf-8")) for page in pages}
     return {page: texts for page, texts in found.items() if texts}
@@ -50,7 +49,6 @@ def test_files_that_pages_name_exist():
 
 
 def test_pictures_of_the_gallery_are_of_scripts_that_there_are():
-    """The site's build draws them: the repository holds none."""
     named = {
         (page.stem, script)
         for page in PAGES
@@ -89,7 +87,6 @@ def test_python_runs(page, monkeypatch, capsys):
 
 
 def test_scripts_of_the_gallery_are_short_and_assert_a_number():
-    """The build of the site runs them."""
     scripts = sorted((ROOT / "examples/gallery").glob("*.py"))
     assert len(scripts) >= 12
     for path in scripts:

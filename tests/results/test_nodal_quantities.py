@@ -45,7 +45,6 @@ def view(moved):
 
 
 def test_stress_at_the_surface_meets_the_load(view, moved):
-    """sigma_zz = -p and no shear on a flat surface, at every time, to which viscous stress adds."""
     kept, mesh = views.with_tensors(view).tensors, moved.mesh
     np.testing.assert_array_equal(kept.nodes, np.arange(len(mesh.points)))
     top = np.unique(mesh.facets["top"])
@@ -96,7 +95,6 @@ def test_between_two_materials_strain_jumps_and_traction_does_not():
 
 @pytest.mark.parametrize("quantity", ["stress_xx", "largest_shear_strain", "acceleration"])
 def test_the_colour_at_a_node_is_what_a_probe_reads_there(quantity, moved):
-    """Probes by operators at points, nodes by polynomials about them: a corner of the surface."""
     corners = np.unique(moved.mesh.tets[:, :4])
     x = moved.mesh.points[corners]
     away = np.linalg.norm(x - np.array([6e-3, 3e-3, 0.0]), axis=1)
@@ -113,7 +111,6 @@ def test_the_colour_at_a_node_is_what_a_probe_reads_there(quantity, moved):
 
 @draws
 def test_pictures_are_coloured_by_the_quantity(view):
-    """A signed one, and the same motion: another picture."""
     pictures = [
         render.picture([views.with_shade(view, replace(SCENE, quantity=name))], style("report"))
         for name in ("strain_zz", "displacement_x")
@@ -122,7 +119,6 @@ def test_pictures_are_coloured_by_the_quantity(view):
 
 
 def test_a_report_maps_the_quantity_at_the_depth_of_the_probes(view, moved, tmp_path):
-    """Where a probe is, the map is the RMS of the lines that the probe reads."""
     quantity = "strain_zz"
     scene = replace(SCENE, quantity=quantity, depth=0.7e-3)
     album.write_view(replace(view, scene=scene), tmp_path)

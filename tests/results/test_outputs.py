@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import corpus
 import numpy as np
@@ -15,34 +16,29 @@ import pytest
 
 from simple_model import Response
 from skinwave.commands.cli import READER_GONE, main
-from skinwave.results import files, record
-from skinwave.results.outputs import (
-    foreign_file,
-    listed_files,
-    output_file,
-    output_folder,
-    output_path,
-    seal,
-)
+from skinwave.results import files, outputs, record
+from skinwave.results.outputs import foreign_file, output_file, output_path
 from skinwave.results.run import Run
 from skinwave.scene.file import loads
 from skinwave.studies.album import open_album
 
 RUN = ["run", "none.toml", "--quiet"]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="links and pipes differ")
+NAMES = (
+    "CON", "Nul", "COM1", " CON ", "trailing.", "a/b", "..", "", "a:b*?<>|", "Pictures", "𠀀" * 80,
+    "n" * 300, "\x1b[31m", "name\u202e",
+)  # fmt: skip
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with a scene that takes no time to compute."""
     (tmp_path / "none.toml").write_text(corpus.SILENT_GROUND)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 def make(out, text="one", meanwhile=lambda: None, **options):
-    """A folder as a command writes it, and what happens until it is finished."""
-    with output_folder(out, **options) as place:
+    with outputs.output_folder(out, **options) as place:
         meanwhile()
         (place / "index.html").write_text(text)
         record.write(place, {"typed": "", "name": "run", "options": {}})
@@ -50,7 +46,6 @@ def make(out, text="one", meanwhile=lambda: None, **options):
 
 
 def a_run(name="small"):
-    """A result of a silent scene."""
     scene = loads(corpus.SILENT_GROUND.replace('"small"', f'"{name}"'))
     response = Response(
         model="point-kernel", times=np.arange(4) / 100, probes=scene.probe_points,
@@ -60,7 +55,6 @@ def a_run(name="small"):
 
 
 def refused(capsys, *arguments):
-    """The one sentence by which a command is refused; all that is there stays the same."""
     before = corpus.contents(Path.cwd())
     assert main([*map(str, arguments)]) == 2
     said = capsys.readouterr().err
@@ -109,11 +103,10 @@ def test_a_file_that_the_user_added_or_changed_is_kept(folder):
 def test_inputs_are_never_replaced(folder, capsys, monkeypatch):
     out = make(folder / "out")
     (out / "none.toml").write_text(corpus.SILENT_GROUND)
-    seal(out)
+    outputs.seal(out)
     asked = ["run", "out/none.toml", "--out", "out", "--overwrite", "--quiet"]
     assert "in use" in refused(capsys, *asked)
-    asked = ["convert", "none.toml", "none.toml", "--overwrite", "--quiet"]
-    assert "none.toml" in refused(capsys, *asked)
+    refused(capsys, "convert", "none.toml", "none.toml", "--overwrite", "--quiet")
     monkeypatch.chdir(out)
     assert "in use" in refused(capsys, *RUN, "--out", "..", "--overwrite")
 
@@ -133,9 +126,7 @@ def test_results_of_concurrent_commands_are_kept(folder):
 
 
 def test_an_error_keeps_the_earlier_result(folder):
-    def interrupted():
-        raise KeyboardInterrupt
-
+    interrupted = Mock(side_effect=KeyboardInterrupt)
     make(folder / "out", "old")
     before = corpus.contents(folder)
     with pytest.raises(KeyboardInterrupt):  # without a finished run
@@ -182,11 +173,9 @@ def test_an_interrupted_report_keeps_finished_runs(folder, capsys, monkeypatch):
 
 
 def test_an_incomplete_run_is_removed(folder, monkeypatch):
-    def fails(path, effort):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
+    full = Mock(side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     files.write_run(folder / "out/one", a_run())
-    monkeypatch.setattr("skinwave.results.files.write_lines", fails)
+    monkeypatch.setattr("skinwave.results.files.write_lines", full)
     with pytest.raises(OSError, match="space"):
         files.write_run(folder / "out/two", a_run())
     assert [run.tacton for run in open_album(folder / "out").runs] == ["small"]
@@ -197,8 +186,7 @@ def test_a_full_disk_is_reported_in_one_sentence(folder, capsys, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
     monkeypatch.setattr("pathlib.Path.write_text", full)
-    said = refused(capsys, *RUN, "--out", "out")
-    assert "out" in said
+    refused(capsys, *RUN, "--out", "out")
     monkeypatch.undo()
     refused(capsys, *RUN, "--out", "n" * 300)
 
@@ -233,18 +221,12 @@ def test_a_record_names_command_scene_model_and_files(folder):
     assert found["command"]["typed"].startswith("skinwave run none.toml")
     assert loads(found["scene"]).tacton == loads(corpus.SILENT_GROUND).tacton
     assert found["model"] == "point-kernel"
-    assert set(listed_files(folder / "out")) >= {"responses.npz", "lines.csv", "index.html"}
+    assert set(outputs.listed_files(folder / "out")) >= {"responses.npz", "lines.csv", "index.html"}
     rows = [*csv.DictReader((folder / "out/lines.csv").read_text().splitlines())]
     assert {row["model"] for row in rows} == {"point-kernel"}
     (folder / "out/record.json").write_text(json.dumps([1]))
     with pytest.raises(ValueError, match=r"record\.json"):
         record.read(folder / "out")
-
-
-NAMES = (
-    "CON", "Nul", "COM1", " CON ", "trailing.", "a/b", "..", "", "a:b*?<>|", "Pictures", "𠀀" * 80,
-    "n" * 300, "\x1b[31m", "name\u202e",
-)  # fmt: skip
 
 
 def test_folder_names_are_valid_on_any_system():

@@ -15,7 +15,6 @@ HOSTILE = "a\x1b[2Jb\x07c\x9bd\x7fe\u202ef\u2066g\x00h\ud800i"
 
 
 def is_plain(text):
-    """Whether a terminal obeys nothing of a text but its ends of lines."""
     return all(letter.isprintable() or letter == "\n" for letter in text)
 
 
@@ -50,14 +49,10 @@ def test_printed_text_has_no_control_characters(tmp_path, monkeypatch, capsys):
 
 
 def test_the_progress_bar_escapes_markup(monkeypatch):
-    """Rich would make colours and links of them."""
     drawn, name = io.StringIO(), "[red]x[/red][link=file:///etc]y"
-
-    def console(**asked):
-        return Console(file=drawn, force_terminal=True, width=120)
-
+    console = Console(file=drawn, force_terminal=True, width=120)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-    monkeypatch.setattr("rich.console.Console", console)
+    monkeypatch.setattr("rich.console.Console", lambda **asked: console)
     with common.progress_of(Namespace(quiet=False, json=False)) as progress:
         progress(f"{name}\x1b[2J", 0.5)
     assert name in drawn.getvalue()

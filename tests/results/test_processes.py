@@ -16,7 +16,6 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 
 
 def test_modules_of_the_working_folder_are_not_imported(tmp_path):
-    """A user's own random.py is no module of the standard library."""
     for name in ("random", "numpy", "multiprocessing", "signal", "skinwave"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('imported')")
     (tmp_path / "elsewhere").mkdir()
@@ -67,7 +66,6 @@ def test_a_pool_cancels_unfinished_calls_and_restores_the_environment(monkeypatc
 
 
 def test_threads_that_limit_linear_algebra_restore_the_limit():
-    """Two limits that overlap, the first of which ends first."""
 
     def threads():
         return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]

@@ -20,7 +20,6 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="paths differ")
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with two good scenes, a folder of the user's, and a link to itself."""
     (tmp_path / "good.toml").write_text(corpus.GOOD)
     (tmp_path / "none.toml").write_text(corpus.SILENT_GROUND)
     (tmp_path / "kept").mkdir()

@@ -14,58 +14,16 @@ from skinwave.scene.paper15 import scenes, tactons
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
-
-
-def test_the_paper_has_fifteen_tactons():
-    patterns = dict(tactons())
-    assert len(patterns) == 15
-    moving = [t for t in patterns.values() if t.trajectory.drawing_frequency]
-    assert len(moving) == 12
-    assert sum(t.am_frequency > 0 for t in moving) == 9
-
-
-def test_presets_round_trip():
-    for name, tacton in tactons():
-        for scene in scenes(name, tacton).values():
-            assert loads(dumps(scene)) == scene
-
-
-def test_examples_round_trip():
-    assert len(EXAMPLES) > 5
-    for path in EXAMPLES:
-        assert loads(dumps(read(path))) == read(path), path
-
-
-def test_a_material_round_trips():
-    scene = loads(
-        "[body]\nkind = 'slab'\n[body.material]\ndensity_kg_m3 = 1070\n"
-        "shear_modulus_pa = 25e3\npoisson = 0.49\nviscosity_pa_s = 3\n"
-    )
-    assert scene.body.material == Material(
-        density=1070, shear_modulus=25e3, poisson=0.49, viscosity=3
-    )
-    assert loads(dumps(scene)) == scene
-
-
-def test_missing_keys_take_the_value_of_the_preset():
-    assert loads("").body == BODIES["skin-slab"]
-    assert loads("[body]\nkind = 'sheet'").body == BODIES["paper-sheet-loose"]
-    # A body, or none, never changes the load.
-    assert loads("[body]\nkind = 'none'").pressure == loads("").pressure
-    assert loads("").pressure.drive == "pressure_squared"
-
-
-def test_keys_have_their_units():
-    scene = loads(
-        "[tacton]\namplitude_percent = 50\nshape = 'circle'\nsize_mm = 20\nspeed_m_per_s = 12\n"
-        "[focus]\nheight_mm = 150\n[probes]\npoints_mm = [[5, -10]]"
-    )
-    assert scene.tacton.amplitude == 0.5
-    assert scene.tacton.trajectory.size == 0.020
-    assert scene.pressure.height == 0.150
-    np.testing.assert_array_equal(scene.probe_points, [[0.005, -0.010]])
-
-
+TACTON = "[tacton]\nduration_s = 0.05\n"
+KEYS = {
+    "size = 10": ("size_mm", "size_mm = 10"),
+    "[tacton.rhythm]\npulses = [[1, 2]]": ("pulses_ms", "[tacton.rhythm]\npulses_ms = [[1, 2]]"),
+    "[body]\n[body.material]\nyoung = 3": ("young_modulus_pa", ""),
+    "[body]\nsize_mm = 10": ("[tacton]", "size_mm = 10"),
+    "[body]\nkind = slab": ("", '[body]\nkind = "slab"'),
+    '[body]\nkind = "sheet"\nair = True': ("", '[body]\nkind = "sheet"\nair = true'),
+    "size_mm = 0,5": ("", "size_mm = 0.5"),
+}
 INVALID = {  # and what the error names
     "[tacton]\nshape = 'circel'": "'circle'",
     "[tacton]\nsize = 20": "'size_mm'",
@@ -106,6 +64,45 @@ NONSENSE = (
 )  # fmt: skip
 
 
+def test_the_paper_has_fifteen_tactons():
+    patterns = dict(tactons())
+    assert len(patterns) == 15
+    moving = [t for t in patterns.values() if t.trajectory.drawing_frequency]
+    assert len(moving) == 12
+    assert sum(t.am_frequency > 0 for t in moving) == 9
+
+
+def test_scenes_round_trip():
+    assert len(EXAMPLES) > 5
+    found = [scene for name, tacton in tactons() for scene in scenes(name, tacton).values()]
+    for scene in (*found, *map(read, EXAMPLES)):
+        assert loads(dumps(scene)) == scene
+    text = "[body.material]\ndensity_kg_m3 = 1070\nshear_modulus_pa = 25e3\npoisson = 0.49\n"
+    scene = loads(text + "viscosity_pa_s = 3\n")
+    own = Material(density=1070, shear_modulus=25e3, poisson=0.49, viscosity=3)
+    assert scene.body.material == own
+    assert loads(dumps(scene)) == scene
+
+
+def test_missing_keys_take_the_value_of_the_preset():
+    assert loads("").body == BODIES["skin-slab"]
+    assert loads("[body]\nkind = 'sheet'").body == BODIES["paper-sheet-loose"]
+    # A body, or none, never changes the load.
+    assert loads("[body]\nkind = 'none'").pressure == loads("").pressure
+    assert loads("").pressure.drive == "pressure_squared"
+
+
+def test_keys_have_their_units():
+    scene = loads(
+        "[tacton]\namplitude_percent = 50\nshape = 'circle'\nsize_mm = 20\nspeed_m_per_s = 12\n"
+        "[focus]\nheight_mm = 150\n[probes]\npoints_mm = [[5, -10]]"
+    )
+    assert scene.tacton.amplitude == 0.5
+    assert scene.tacton.trajectory.size == 0.020
+    assert scene.pressure.height == 0.150
+    np.testing.assert_array_equal(scene.probe_points, [[0.005, -0.010]])
+
+
 def test_invalid_scenes_are_refused_in_one_sentence():
     for text, named in INVALID.items():
         with pytest.raises(ValueError, match=re.escape(named)) as error:
@@ -131,3 +128,25 @@ def test_a_preset_is_changed_by_other_keys():
     assert body.layers == known.layers
     assert (body.depth, body.placement.lift) == (0.020, 0.001)
     assert loads(dumps(replace(loads(""), body=body))).body == body
+
+
+@pytest.mark.parametrize("wrong", KEYS)
+def test_the_key_that_a_message_names_is_accepted(wrong):
+    name, right = KEYS[wrong]
+    with pytest.raises(ValueError) as refusal:  # noqa: PT011
+        loads(TACTON + wrong)
+    assert name in str(refusal.value)
+    loads(TACTON + right)
+
+
+@pytest.mark.parametrize(
+    "path", [r'"C:\Users\me\hand.stl"', r"C:\temp\thumb.stl", r'"meshes\new.stl"']
+)
+def test_a_windows_path_needs_single_quotes_or_slashes(path):
+    scene = '[body]\nkind = "mesh"\nmaterial = "palm"\nfile = '
+    with pytest.raises(ValueError, match="'.*/"):
+        loads(scene + path)
+    plain = path.strip('"')
+    assert loads(f"{scene}'{plain}'").body.file == plain
+    slashes = plain.replace("\\", "/")
+    assert loads(f'{scene}"{slashes}"').body.file == slashes

@@ -6,20 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import simple_model
 import skinwave
-from simple_model import (
-    FractionalKelvinVoigt,
-    FractionalZener,
-    Material,
-    MovingPressure,
-    PronyTerm,
-    Tacton,
-    Trajectory,
-    fit_prony,
-    modulus_table,
-    of_law,
-    tabulated,
-)
+from simple_model import FractionalZener, Material, Tacton, tabulated
 from simple_model.layers.flat_body import steady_lines
 from simple_model.layers.material import PRESETS
 from skinwave.bodies.analytic import compliance
@@ -30,7 +19,7 @@ from skinwave.scene.scene import Body, Scene
 from skinwave.scene.variation import cases
 
 ECOFLEX = PRESETS["ecoflex"]
-ZENER = of_law(
+ZENER = simple_model.of_law(
     density=1000.0,
     poisson=0.45,
     law=FractionalZener(shear_modulus=20e3, fast_modulus=60e3, exponent=0.6, time=0.5e-3),
@@ -38,10 +27,11 @@ ZENER = of_law(
 COMPLEX = 2 * np.pi * np.array([0.0, 3.0, 140.0, 140.0 - 20j, -60.0, 900.0 - 5j, -30j])
 HERTZ = np.geomspace(5.0, 1500.0, 26)
 PROBES = ((0.0, 0.0), (0.006, 0.0))
+BODY = "[body.material]\ndensity_kg_m3 = 1070\npoisson = 0.4999\n"
+HEADER = "frequency_hz,storage_pa,loss_pa\n"
 
 
 def ecoflex(w):
-    """The law of the preset by polar coordinates, w > 0."""
     return 25e3 * (1 + cmath.rect((w * 0.3e-3) ** 0.33, 0.33 * cmath.pi / 2))
 
 
@@ -59,23 +49,25 @@ def table_of(material, hertz=HERTZ):
 
 def scene(material, drive="linear", **tacton):
     """A load of zero mean: creep under a mean one takes far longer than a Tacton."""
-    load = MovingPressure(
+    load = simple_model.MovingPressure(
         tacton=Tacton(**{"am_frequency": 140, "duration": 0.1} | tacton), drive=drive
     )
     body = Body(material=material, width=0.03, height=0.03, depth=0.008, sides="clamped")
     return Scene(pressure=load, body=body, probes=PROBES)
 
 
-# The laws
-
-
 def test_fractional_laws_with_exponent_1_are_kelvin_voigt_and_zener():
     viscous = Material(density=1.0, shear_modulus=25e3, poisson=0.4, viscosity=25e3 * 0.3e-3)
     linear = Material(
-        density=1.0, shear_modulus=20e3, poisson=0.4, prony=(PronyTerm(modulus=40e3, time=5e-4),)
+        density=1.0,
+        shear_modulus=20e3,
+        poisson=0.4,
+        prony=(simple_model.PronyTerm(modulus=40e3, time=5e-4),),
     )
     for exponent in (1.0, 1 - 1e-14):
-        found = FractionalKelvinVoigt(shear_modulus=25e3, exponent=exponent, time=0.3e-3)
+        found = simple_model.FractionalKelvinVoigt(
+            shear_modulus=25e3, exponent=exponent, time=0.3e-3
+        )
         np.testing.assert_allclose(found(COMPLEX), viscous.complex_modulus(COMPLEX), rtol=1e-12)
         found = FractionalZener(
             shear_modulus=20e3, fast_modulus=60e3, exponent=exponent, time=0.5e-3
@@ -87,9 +79,6 @@ def test_constants_out_of_range_are_refused():
     for law, said in (({"exponent": 1.5}, "exponent"), ({"fast_modulus": 1e3}, "at rest")):
         with pytest.raises(ValueError, match=said):
             replace(ZENER.law, **law)
-
-
-# Prony series
 
 
 def test_a_series_has_its_stated_error_and_few_terms():
@@ -108,15 +97,12 @@ def test_a_series_has_its_stated_error_and_few_terms():
 
 
 def test_flat_body_uses_the_series_of_a_table():
-    circle = Trajectory(shape="circle", size=0.01, speed=4.0)
+    circle = simple_model.Trajectory(shape="circle", size=0.01, speed=4.0)
     # From 0 Hz on, where a table does not leave open what it creeps to.
     table = table_of(ECOFLEX, [0.0, *np.geomspace(1.0, 3000.0, 60)])
     own, law = (scene(m, drive="pressure_squared", trajectory=circle) for m in (table, ECOFLEX))
     found, expected = (compute(each, "flat-body").displacement for each in (own, law))
     assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected)
-
-
-# What a plan says of it
 
 
 def test_the_expected_error_of_a_plan_includes_the_series():
@@ -158,9 +144,6 @@ def test_a_table_continues_by_its_series():
     assert table.complex_modulus(2 * np.pi * HERTZ[3:5].mean()) == pytest.approx(halfway, rel=1e-12)
 
 
-# What no solid can be
-
-
 @pytest.mark.parametrize(
     ("law", "said"),
     [(lambda w: 25e3 + 10e3j * np.sign(w), "not causal"),
@@ -175,15 +158,7 @@ def test_every_model_refuses_an_impossible_law(law, said):
             compute(own, model)
 
 
-# Scene files
-
-
-BODY = "[body.material]\ndensity_kg_m3 = 1070\npoisson = 0.4999\n"
-HEADER = "frequency_hz,storage_pa,loss_pa\n"
-
-
 def test_a_table_is_read_from_the_folder_of_the_scene(tmp_path):
-    """The complete scene has its numbers, and needs the file no more."""
     rows = "200,27e3,5e3\n20,25e3,1e3\n# a comment\n60, 26e3 ,3e3\n"
     (tmp_path / "moduli.csv").write_text(HEADER + rows)
     (tmp_path / "scene.toml").write_text(BODY + 'table = "moduli.csv"\n')
@@ -208,7 +183,7 @@ def test_invalid_files_of_moduli_are_refused():
         ("210,1e4,-3\n", "-3 Pa at 210 Hz"),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=said):
-            modulus_table(text and HEADER + text)
+            simple_model.modulus_table(text and HEADER + text)
 
 
 def test_a_loss_factor_is_nearly_constant_and_its_law_causal():
@@ -230,7 +205,7 @@ def test_a_loss_factor_is_nearly_constant_and_its_law_causal():
 
 def test_laws_that_relax_far_below_the_band_have_a_series():
     law = FractionalZener(shear_modulus=10e3, fast_modulus=1e5, exponent=0.05, time=1e-4)
-    series, w = fit_prony(law, rest=10e3), 2 * np.pi * np.geomspace(1, 2000, 501)
+    series, w = simple_model.fit_prony(law, rest=10e3), 2 * np.pi * np.geomspace(1, 2000, 501)
     assert series.error <= 0.005
     assert np.abs(series(w) / law(w) - 1).max() < 0.006
     assert complex(series(0.0)) == pytest.approx(10e3, rel=1e-9)

@@ -7,21 +7,9 @@ import pytest
 
 import fem
 import meshes
+import simple_model
 from meshes import cache
-from simple_model import (
-    DRIVES,
-    DriveLaw,
-    MovingPressure,
-    PronyTerm,
-    Rhythm,
-    Tacton,
-    Trajectory,
-    flat_body,
-    named_lines,
-    point_kernel,
-    steady_state,
-    tabulated,
-)
+from simple_model import DriveLaw, MovingPressure, PronyTerm, Tacton
 from simple_model.layers.compliance import slab
 from simple_model.load.sampling import highest_line
 from simple_model.load.spectrum import load_lines
@@ -30,12 +18,16 @@ from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Body, Scene
 
 PROBES = np.array([[0.0, 0.0], [0.005, 0.0]])
-CIRCLE = Trajectory(shape="circle", size=0.01, speed=1.0)
+CIRCLE = simple_model.Trajectory(shape="circle", size=0.01, speed=1.0)
 TWO = fem.Material(
     density=1000.0, shear_modulus=20e3, poisson=0.45,
     prony=(PronyTerm(modulus=8e3, time=0.4e-3), PronyTerm(modulus=6e3, time=3e-3)),
 )  # fmt: skip
 HERTZ = np.array([0.0, 30.0, 140.0, 600.0])
+CUBIC = DriveLaw(name="cubic", degree=3, pressure=lambda A, M, m: (A * (1 + m * M) / (1 + m)) ** 3)
+AM = Tacton(am_frequency=140)
+GATE = DriveLaw(name="gate", pressure=lambda A, M, m: A * (np.asarray(M) > 0.3))
+BEATEN = Tacton(rhythm=simple_model.Rhythm(pulses=((0.1, 0.05),), ramp=0.01))
 
 
 def saturating(amplitude, modulation, depth):
@@ -44,12 +36,6 @@ def saturating(amplitude, modulation, depth):
 
 
 SATURATING = DriveLaw(name="saturating", pressure=saturating)
-CUBIC = DriveLaw(
-    name="cubic", degree=3,
-    pressure=lambda A, M, m: (A * (1 + m * M) / (1 + m)) ** 3,
-)  # fmt: skip
-
-AM = Tacton(am_frequency=140)
 
 
 def scene(material=TWO, **load):
@@ -59,12 +45,8 @@ def scene(material=TWO, **load):
     return Scene(pressure=pressure, body=body, probes=tuple(map(tuple, PROBES.tolist())))
 
 
-# A drive law
-
-
 @pytest.mark.parametrize("law", [SATURATING, CUBIC])
 def test_lines_of_any_drive_law_match_its_waveform(law):
-    """Without aliasing: as many as there are, against a Fourier transform in time."""
     tacton = Tacton(am_frequency=100.0, envelope_frequency=20.0, duration=1.0)
     load = MovingPressure(tacton=tacton, drive=law)
     lines = load_lines(load, 1e-6)
@@ -77,11 +59,9 @@ def test_lines_of_any_drive_law_match_its_waveform(law):
     above = np.flatnonzero(np.abs(spectrum) > 1e-3 * np.abs(spectrum).max()).max()
     assert above > 2 * 120  # beyond the second order
     assert highest_line(load) >= above
-    assert "3f_AM" in named_lines(replace(load, tacton=replace(tacton, envelope_frequency=0.0)))
-
-
-GATE = DriveLaw(name="gate", pressure=lambda A, M, m: A * (np.asarray(M) > 0.3))
-BEATEN = Tacton(rhythm=Rhythm(pulses=((0.1, 0.05),), ramp=0.01))
+    assert "3f_AM" in simple_model.named_lines(
+        replace(load, tacton=replace(tacton, envelope_frequency=0.0))
+    )
 
 
 def test_unusable_laws_are_refused():
@@ -98,20 +78,18 @@ def test_unusable_laws_are_refused():
 
 
 def test_scenes_and_models_know_a_registered_law(monkeypatch):
-    """One line in a registry: scene files and all models know it."""
-    monkeypatch.setitem(DRIVES, CUBIC.name, CUBIC)
+    monkeypatch.setitem(simple_model.DRIVES, CUBIC.name, CUBIC)
     own = scene(drive="cubic")
     assert 'drive = "cubic"' in dumps(own)
     assert loads(dumps(own)) == own
     assert dumps(scene(drive=CUBIC)) == dumps(own)
     times = np.arange(1000) / 1e4
-    steady, whole, kernel = (
-        steady_state(slab(TWO, 0.008), own.pressure, PROBES, times).displacement,
-        flat_body(slab(TWO, 0.008), own.pressure, PROBES, times).displacement,
-        point_kernel(own.pressure, PROBES, times).displacement,
+    steady, whole = (
+        model(slab(TWO, 0.008), own.pressure, PROBES, times).displacement
+        for model in (simple_model.steady_state, simple_model.flat_body)
     )
-    late = slice(500, None)
-    assert np.abs(steady - whole)[late].max() < 1e-3 * np.abs(whole).max()
+    assert np.abs(steady - whole)[500:].max() < 1e-3 * np.abs(whole).max()
+    kernel = simple_model.point_kernel(own.pressure, PROBES, times).displacement
     gain = own.pressure.gain(times)[:, None]
     np.testing.assert_allclose(kernel, gain * own.pressure.spot(PROBES, CIRCLE.position(times)))
 
@@ -120,16 +98,12 @@ def test_loads_with_functions_are_not_cached():
     assert cache.key(scene(drive=CUBIC).pressure) != cache.key(scene(drive=CUBIC).pressure)
 
 
-# A material
-
-
 def closed_form(w):
     return 20e3 + 8e3 / (1 + 1 / (0.4e-3j * w)) + 6e3 / (1 + 1 / (3e-3j * w))
 
 
 @pytest.fixture(scope="module")
 def element():
-    """Two cells, the force of a pressure on their top, and a probe."""
     mesh = meshes.block((0.01, 0.01, 0.01), 0.01)
     P = fem.load_operator(mesh)
     return mesh, P @ np.ones(P.shape[1]), fem.probe_operator(mesh, [[0.0, 0.0]])
@@ -152,7 +126,9 @@ def test_the_stiffness_of_an_element_matches_the_closed_form(element):
 
 def test_a_table_of_a_law_gives_the_harmonic_motion_of_the_law(element):
     f = np.linspace(1, 1500, 3000)
-    own = tabulated(density=1000.0, poisson=0.45, frequencies=f, moduli=closed_form(2 * np.pi * f))
+    own = simple_model.tabulated(
+        density=1000.0, poisson=0.45, frequencies=f, moduli=closed_form(2 * np.pi * f)
+    )
     np.testing.assert_allclose(answers(element, own), answers(element, TWO), rtol=2e-3)
     power = compute(scene(own), "fem-harmonic", h=0.01).effort
     assert power.energy_imbalance < 1e-6

@@ -113,9 +113,7 @@ def test_frequencies_of_square_plates_are_those_published(supports, published, l
 
 
 def clamped_beam(tension, loss, frequency):
-    """Deflection of the middle of a clamped, stretched beam under 1 Pa: its characteristic roots
-    D (1 + i eta) k^4 - T k^2 - m w^2 = 0 and the two conditions of an end.
-    """
+    """Deflection of the middle under 1 Pa by the roots of D (1 + i eta) k^4 - T k^2 = m w^2."""
     stiff, inertia = D * (1 + 1j * loss), MASS * (2 * np.pi * frequency) ** 2
     k = np.sqrt(np.roots([stiff, -tension, -inertia]))
     end = np.cosh(k * SIDE / 2), k * np.sinh(k * SIDE / 2)
@@ -208,7 +206,6 @@ def test_invalid_plates_are_refused():
     [{"viscosity": 20.0}, {"viscosity": 2.0, "prony": (PronyTerm(modulus=5e3, time=1e-3),)}],
 )
 def test_modes_from_rest_match_ordinary_differential_equations(losses):
-    """Underdamped, overdamped and relaxing; acceleration at the start is force per mass."""
     solid = Material(density=1000, shear_modulus=25e3, poisson=0.3, **losses)
     plate = isotropic(nu=0.3, tension_x=20.0)
     one = plate_modes(plate, 60.0)

@@ -1,27 +1,16 @@
 """The record that every model returns: its own arrays, checked."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from scipy import signal
 
-from simple_model import (
-    MovingPressure,
-    Response,
-    Tacton,
-    Trajectory,
-    line_table,
-    lines,
-    phasors,
-    point_kernel,
-    spectra,
-    spectrum,
-)
+import simple_model
+from simple_model import MovingPressure, Response, Tacton, lines, point_kernel, spectra
 from skinwave.results.run import ASSESSED
 
 TIMES = np.arange(5) / 10_000
+SECOND = np.arange(10_000) / 10_000
+PROBES = [[0.0, 0.0], [0.005, 0.0], [0.010, 0.0], [0.015, 0.0], [0.020, 0.0]]
 
 
 def make(**changed):
@@ -59,30 +48,16 @@ def test_windows_match_scipy():
         np.testing.assert_array_equal(spectra.cosines(name, n), signal.get_window(name, n))
 
 
-def test_slow_imports_are_deferred():
-    """Each of a study's processes and each page would wait for it."""
-    code = "import fem, simple_model, sys; print(*sys.modules)"
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert {"fem", "simple_model", "scipy.sparse"} <= set(said.stdout.split())
-    few = {"scipy.signal", "scipy.stats", "scipy.interpolate", "scipy.optimize", "matplotlib"}
-    assert not few & set(said.stdout.split())
-
-
 def test_lines_of_two_samples_are_refused():
     two = make(times=TIMES[:2], values=np.ones((2, 2)))
     with pytest.raises(ValueError, match="2 samples"):
-        phasors(two, (100.0,))
-
-
-# Lines of the point kernel
-
-
-SECOND = np.arange(10_000) / 10_000
-PROBES = [[0.0, 0.0], [0.005, 0.0], [0.010, 0.0], [0.015, 0.0], [0.020, 0.0]]
+        simple_model.phasors(two, (100.0,))
 
 
 def kernel(am=0.0, size=0.0, speed=0.0, drive="linear", probes=PROBES):
-    tacton = Tacton(am_frequency=am, trajectory=Trajectory(shape="circle", size=size, speed=speed))
+    tacton = Tacton(
+        am_frequency=am, trajectory=simple_model.Trajectory(shape="circle", size=size, speed=speed)
+    )
     load = MovingPressure(tacton=tacton, profile="main_lobe", drive=drive, peak_pressure=1.0)
     return load, point_kernel(load, probes, SECOND)
 
@@ -109,7 +84,7 @@ def test_lines_beyond_nyquist_are_refused():
 
 
 def test_the_spectrum_shows_amplitudes():
-    f, amplitude = spectrum(sampled(2.0 + 0.7 * np.sin(2 * np.pi * 140 * SECOND)))
+    f, amplitude = simple_model.spectrum(sampled(2.0 + 0.7 * np.sin(2 * np.pi * 140 * SECOND)))
     assert amplitude[np.argmin(abs(f - 140)), 0] == pytest.approx(0.7, rel=1e-9)
     assert amplitude[0, 0] == pytest.approx(2.0, rel=1e-9)
 
@@ -132,7 +107,7 @@ def test_lines_of_stm_are_those_of_the_kernel(size, speed, probe, expected):
 @pytest.mark.parametrize(("am", "size", "speed"), [(80.0, 0.030, 18), (140.0, 0.010, 6)])
 def test_am_and_stm_have_pairs_and_nothing_at_multiples_of_f_d(am, size, speed):
     load, response = kernel(am=am, size=size, speed=speed)
-    found = line_table(load, response, candidates=ASSESSED).amplitudes
+    found = simple_model.line_table(load, response, candidates=ASSESSED).amplitudes
     strongest = found["f_AM"].max()
     assert max(found[n].max() for n in ("f_d", "2f_d", "3f_d")) < 1e-6 * strongest  # -120 dB
     for pair in ("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM"):

@@ -5,20 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simple_model import (
-    MovingPressure,
-    Rhythm,
-    Signal,
-    Tacton,
-    Trajectory,
-    commanded_signal,
-    even_phases,
-    joined,
-    line_table,
-    lines,
-    named_lines,
-    point_kernel,
-)
+import simple_model
+from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, joined, point_kernel
 from simple_model.load.path_cells import path_fourier, path_samples
 from simple_model.load.spectrum import load_lines
 from skinwave import Body, Scene
@@ -28,15 +16,21 @@ TIMES = np.arange(10_000) / 10_000
 PULSES = Rhythm(pulses=((0.010, 0.006), (0.004, 0.0053)))
 CIRCLE = Trajectory(shape="circle", size=0.01, speed=6.0)
 PLACES = np.array([[0.005, 0.0], [0.002, -0.003]])
-
-
-def kernel(times=TIMES, **tacton):
-    load = MovingPressure(tacton=Tacton(**tacton))
-    return point_kernel(load, PLACES, times)
+FREQUENCY = 185.0
+BENT = ((0, 0), (0.008, 0.003), (0, 0.01))
+ENVELOPE = Signal(rate=60, samples=(0.0, 0.4, 1.0, 0.3), role="envelope")
+STRAIGHT = (
+    Trajectory(shape="square", size=0.015, centre=(-0.015, 0.010)),
+    Trajectory(shape="line", size=0.020, centre=(0.020, 0.0)),
+    Trajectory(shape="triangle", size=0.010, centre=(0.0, -0.020)),
+    Trajectory(shape="point", centre=(0.0, 0.020)),
+)
+WITH_ROUND = (Trajectory(shape="circle", size=0.020, centre=(-0.010, 0.0)), STRAIGHT[1])
+RAMPED = Rhythm(pulses=((0.010, 0.006), (0.004, 0.013)), ramp=0.001)
+AROUND = np.array([[0.0, 0.0], [-0.015, 0.010], [0.020, 0.001], [0.004, -0.018]])
 
 
 def wandering(seconds=0.03, count=601, **more):
-    """A recorded path that closes nowhere, with levels."""
     t = np.linspace(0, seconds, count)
     x, y = 0.008 * np.sin(440 * t), 0.006 * np.cos(710 * t + 1)
     level = np.where(t < 0.02, 0.5 + 0.5 * np.sin(560 * t), 0.2)
@@ -53,7 +47,7 @@ def test_gaps_have_no_pressure(drive):
     into = np.mod(TIMES + 1e-9, PULSES.period)
     on = (into < 0.010) | ((into >= 0.016) & (into < 0.020))
     assert not x[~on].any()
-    assert not commanded_signal(tacton, TIMES)[~on].any()
+    assert not simple_model.commanded_signal(tacton, TIMES)[~on].any()
     plain = replace(tacton, rhythm=None)
     same = point_kernel(MovingPressure(tacton=plain, drive=drive), PLACES, TIMES).displacement
     np.testing.assert_array_equal(x[on], same[on])
@@ -62,31 +56,18 @@ def test_gaps_have_no_pressure(drive):
 def test_pulses_make_lines_of_their_period():
     tacton = Tacton(rhythm=Rhythm(pulses=((0.010, 0.010),)))
     load = MovingPressure(tacton=tacton, peak_pressure=1.0)
-    table = line_table(load, point_kernel(load, [[0, 0]], TIMES), candidates=["2f_r"])
+    table = simple_model.line_table(load, point_kernel(load, [[0, 0]], TIMES), candidates=["2f_r"])
     assert table.frequencies["f_r"] == pytest.approx(50.0)
     found = table.amplitudes
     # Half on, half off: 2/(pi n) for odd n, and nothing for even ones.
-    np.testing.assert_allclose(
-        [found["f_r"][0], found["3f_r"][0]], [2 / np.pi, 2 / 3 / np.pi], rtol=1e-2
-    )
+    for n, name in ((1, "f_r"), (3, "3f_r")):
+        assert found[name][0] == pytest.approx(2 / np.pi / n, rel=1e-2)
     assert found["2f_r"] < 1e-3
 
 
-FREQUENCY = 185.0
-STRAIGHT = (
-    Trajectory(shape="square", size=0.015, centre=(-0.015, 0.010)),
-    Trajectory(shape="line", size=0.020, centre=(0.020, 0.0)),
-    Trajectory(shape="triangle", size=0.010, centre=(0.0, -0.020)),
-    Trajectory(shape="point", centre=(0.0, 0.020)),
-)
-WITH_ROUND = (Trajectory(shape="circle", size=0.020, centre=(-0.010, 0.0)), STRAIGHT[1])
-RAMPED = Rhythm(pulses=((0.010, 0.006), (0.004, 0.013)), ramp=0.001)
-AROUND = np.array([[0.0, 0.0], [-0.015, 0.010], [0.020, 0.001], [0.004, -0.018]])
-
-
 def together(paths, **more):
-    """Foci on paths of their own, by one recording."""
-    return Tacton(trajectory=joined(paths, FREQUENCY), foci=even_phases(len(paths)), **more)
+    foci = simple_model.even_phases(len(paths))
+    return Tacton(trajectory=joined(paths, FREQUENCY), foci=foci, **more)
 
 
 def on_circle(**more):
@@ -101,21 +82,13 @@ def on_circle(**more):
     [
         (on_circle(foci=(0.0, 0.3), rhythm=PULSES), PLACES, 2e-4),
         (on_circle(signal=Signal(rate=800, samples=(0.0, 0.4, 1.0, 0.3, -0.8, 0.1))), PLACES, 2e-4),
-        (
-            on_circle(
-                foci=(0.0, 0.3),
-                signal=Signal(rate=60, samples=(0.0, 0.4, 1.0, 0.3), role="envelope"),
-            ),
-            PLACES,
-            2e-4,
-        ),
+        (on_circle(foci=(0.0, 0.3), signal=ENVELOPE), PLACES, 2e-4),
         (together(STRAIGHT, rhythm=RAMPED, duration=0.297), AROUND, 5e-4),
         (together(WITH_ROUND, am_frequency=140.0, duration=0.2), AROUND, 5e-4),
     ],
     ids=["rhythm", "signal", "envelope", "joined", "joined with a circle"],
 )
 def test_lines_match_a_transform_of_the_sampled_load(tacton, places, most):
-    """At 320 kHz, up to about 1 kHz."""
     load, count = MovingPressure(tacton=tacton), round(tacton.duration * 320_000)
     kept = 251 if tacton.duration == 0.25 else 200
     sampled = np.fft.rfft(load(places, (np.arange(count) + 0.5) / 320_000), axis=0)[:kept] / count
@@ -143,7 +116,7 @@ def test_the_pressure_of_joined_paths_is_the_mean_of_each(more):
 
 def test_lines_of_joined_paths_have_the_names_of_the_common_frequency():
     load = MovingPressure(tacton=together(STRAIGHT, am_frequency=83.0, duration=0.2))
-    names = named_lines(load)
+    names = simple_model.named_lines(load)
     assert load.tacton.drawing_frequency == pytest.approx(FREQUENCY)
     assert [name for name in names if name.endswith("f_d")][:3] == ["f_d", "2f_d", "3f_d"]
     assert names["f_d"] == pytest.approx(FREQUENCY)
@@ -153,23 +126,22 @@ def test_lines_of_joined_paths_have_the_names_of_the_common_frequency():
     assert len(f) > 8
     np.testing.assert_allclose(f / FREQUENCY, np.round(f / FREQUENCY), atol=1e-9)
     response = point_kernel(load, AROUND, np.arange(8000) / 4e4)
-    assert (lines(response, [names["f_d"], names["f_d-f_AM"]]).max(axis=1) > 0.1).all()
+    assert (simple_model.lines(response, [names["f_d"], names["f_d-f_AM"]]).max(axis=1) > 0.1).all()
     once = together(STRAIGHT, duration=1 / FREQUENCY)
-    assert not named_lines(MovingPressure(tacton=once))
+    assert not simple_model.named_lines(MovingPressure(tacton=once))
 
 
 def test_even_foci_leave_only_multiples_of_their_number():
     for n in (2, 3):
         foci = tuple(np.arange(n) / n)
-        kept = load_lines(MovingPressure(tacton=Tacton(trajectory=CIRCLE, foci=foci)))
-        assert (np.abs(kept.harmonics) % n == 0).all()
-        response = kernel(trajectory=CIRCLE, foci=foci)
-        found = lines(response, CIRCLE.drawing_frequency * np.arange(17))[:, 0]
+        load = MovingPressure(tacton=Tacton(trajectory=CIRCLE, foci=foci))
+        assert (np.abs(load_lines(load).harmonics) % n == 0).all()
+        response = point_kernel(load, PLACES, TIMES)
+        found = simple_model.lines(response, CIRCLE.drawing_frequency * np.arange(17))[:, 0]
         others = np.arange(17) % n != 0
         assert found[others].max() < 1e-8 * found[0]
-        names = named_lines(MovingPressure(tacton=Tacton(trajectory=CIRCLE, foci=foci)))
+        names = simple_model.named_lines(load)
         assert list(names) == [f"{n * k}f_d" for k in range(1, len(names) + 1)]
-        assert names
 
 
 def test_several_foci_push_with_the_force_of_one():
@@ -177,13 +149,9 @@ def test_several_foci_push_with_the_force_of_one():
     everywhere = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
     one = MovingPressure(tacton=Tacton(am_frequency=140, trajectory=CIRCLE))
     for phases in ((0.0, 0.1, 0.35), tuple(np.arange(8) / 8)):
-        tacton = replace(one.tacton, foci=phases)
-        many = replace(one, tacton=tacton)
-        np.testing.assert_allclose(
-            many(everywhere, [0.0, 0.0013]).sum(axis=1),
-            one(everywhere, [0.0, 0.0013]).sum(axis=1),
-            rtol=1e-6,
-        )
+        many = replace(one, tacton=replace(one.tacton, foci=phases))
+        forces = (load(everywhere, [0.0, 0.0013]).sum(axis=1) for load in (many, one))
+        np.testing.assert_allclose(*forces, rtol=1e-6)
         assert many.gain(0.0013) == pytest.approx(one.gain(0.0013) / len(phases))
 
 
@@ -197,9 +165,8 @@ def test_polylines_run_at_constant_speed_round_or_there_and_back():
     assert once.drawing_frequency == pytest.approx(1.4 / 0.014)
     for path, at in ((there, 6 / 28), (there, 22 / 28), (round_, 6 / 24), (once, 6 / 14)):
         np.testing.assert_allclose(path.at_phase(at), corners[1], atol=1e-15)
-        steps = np.linalg.norm(
-            np.diff(path.at_phase(np.linspace(0, 1, 28001)[:-1]), axis=0), axis=1
-        )
+        along = path.at_phase(np.linspace(0, 1, 28001)[:-1])
+        steps = np.linalg.norm(np.diff(along, axis=0), axis=1)
         assert np.median(steps) == pytest.approx(path.length / 28000, rel=1e-6)
 
 
@@ -232,11 +199,7 @@ LOADS = {
     "foci in pulses": {"foci": (0.0, 0.25), "rhythm": PULSES, "trajectory": CIRCLE},
     "recorded": {"trajectory": wandering()},
     "signal": {"signal": Signal(rate=800, samples=(0, 0.4, 1.0, 0.3, -0.8, 0.1))},
-    "polyline": {
-        "trajectory": Trajectory(
-            shape="polyline", points=((0, 0), (0.008, 0.003), (0, 0.01)), speed=4.0
-        )
-    },
+    "polyline": {"trajectory": Trajectory(shape="polyline", points=BENT, speed=4.0)},
 }
 
 

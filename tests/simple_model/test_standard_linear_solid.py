@@ -19,13 +19,8 @@ from skinwave.planning.simulate import compute
 from skinwave.scene.scene import Body
 
 ZENER = fem.PRESETS["palm-zener"]
-LOAD = MovingPressure(
-    tacton=Tacton(
-        am_frequency=140,
-        duration=0.01,
-        trajectory=Trajectory(shape="circle", size=0.01, speed=6.0),
-    )
-)
+CIRCLE = Trajectory(shape="circle", size=0.01, speed=6.0)
+LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.01, trajectory=CIRCLE))
 SCENE = skinwave.Scene(
     pressure=LOAD,
     body=Body(material="palm-zener", width=0.04, height=0.04, depth=0.01),
@@ -35,7 +30,6 @@ SCENE = skinwave.Scene(
 
 @pytest.fixture(scope="module")
 def block():
-    """A mesh, the force of a focus on it, and two probes."""
     mesh = meshes.block((0.03, 0.03, 0.01), 0.005)
     points, P = fem.facet_points(mesh)[:, :2], fem.load_operator(mesh)
     force = P @ np.exp(-(points**2).sum(axis=1) / 2 / 0.00435**2)
@@ -43,7 +37,6 @@ def block():
 
 
 def layered(mesh):
-    """Two materials that relax in different times on one that does not."""
     depth = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
     slower = replace(ZENER, prony=(PronyTerm(modulus=10e3, time=2e-3),), viscosity=1.0)
     layers = {0: slower, 1: ZENER, 2: fem.PRESETS["palm"]}
@@ -108,7 +101,6 @@ def test_the_energy_balance_includes_losses_of_the_law():
 
 
 def test_small_motion_at_large_displacement_relaxes_as_linear_motion_does():
-    """Tetrahedra and a membrane among their nodes, and the energy balance of both."""
     solid = replace(ZENER, poisson=0.3, prony=(), loss_factor=0.3)
     mesh = meshes.sheet(0.02, 0.02, 0.002, 0.01)
     layer = fem.Membrane(triangles=meshes.middle_plane(mesh), thickness=1e-3, material=solid)
@@ -133,7 +125,6 @@ def test_small_motion_at_large_displacement_relaxes_as_linear_motion_does():
 
 
 def test_modes_of_a_sheet_relax_as_the_sheet_does():
-    """Its bending and, at large deflection, its stretching."""
     solid = replace(ZENER, poisson=0.3)
     modal = fem.Operators(
         K=sparse.diags_array([4e4, 9e4]).tocsr(), C=sparse.csr_array((2, 2)),

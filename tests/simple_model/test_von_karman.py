@@ -1,6 +1,4 @@
-"""Von Karman's plate in modes, against published tables, closed forms and energies minimised in
-other functions.
-"""
+"""Von Karman's plate in modes, against published tables, closed forms and least energies."""
 
 from functools import lru_cache
 from itertools import pairwise
@@ -12,11 +10,7 @@ from scipy.optimize import brentq, minimize
 
 from simple_model import from_young
 from simple_model.load.spectrum import synthesise
-from simple_model.plates.karman_motion import (
-    forced_motion,
-    linear_motion,
-    stretched_motion,
-)
+from simple_model.plates.karman_motion import forced_motion, linear_motion, stretched_motion
 from simple_model.plates.modes import Plate, plate_modes
 from simple_model.plates.path_forces import plate_lines
 from simple_model.plates.polynomials import gauss_points
@@ -27,6 +21,37 @@ from skinwave.scene.file import loads
 
 YOUNG, THICKNESS, SIDE, MASS = 4e9, 1e-4, 0.1, 0.08  # Pa, m, m, kg/m2
 FRAME = ("left", "right", "front", "back")
+ORTHOTROPIC = Plate(
+    size_x=0.12, size_y=0.09, d11=5e-4, d22=2e-4, d12=0.5e-4, d66=1e-4, mass_per_area=MASS,
+    air_density=0.0, tension_x=3.0, tension_y=1.0, **dict.fromkeys(FRAME, "simply"),
+)  # fmt: skip
+# q a^4 / E h^4 and w / h of a clamped square plate, immovable in its plane, nu = 0.316: S. Levy,
+# Square Plate with Clamped Edges under Normal Pressure Producing Large Deflections, NACA TN 847
+# (1942). His few terms are too soft at large deflection: by 1.1 % at 0.9 h and 2.5 % at 1.9 h
+# compared with the least energy in cosines below.
+LEVY = ((38.3, 0.471), (134.9, 1.121), (402.0, 1.902))
+PLASTIC = from_young(young=YOUNG, poisson=0.3, density=800, loss_factor=0.1, viscosity=1e5)
+DULL = from_young(young=YOUNG, poisson=0.3, density=800, loss_factor=0.6, viscosity=1e5)
+SHEET = """
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.02
+shape = "circle"
+size_mm = 8
+speed_m_per_s = 5
+[focus]
+peak_pressure_pa = PRESSURE
+[body]
+kind = "sheet"
+material = "paper"
+size_x_mm = 30
+size_y_mm = 30
+thickness_mm = 0.1
+[body.mounting]
+edges = ["left", "right"]
+[probes]
+points_mm = [[0, 0], [4, 0]]
+"""
 
 
 def framed(support, nu=0.3, **more):
@@ -43,9 +68,7 @@ def reduced(plate, count, in_plane="held"):
 
 
 def resting(karman, forces):
-    """Coordinates (m,) of all modes under constant forces: of those that stretch where the energy
-    is least, of the others as a linear plate.
-    """
+    """Coordinates (m,) under constant forces: of modes that stretch, where the energy is least."""
     scale, own = np.sqrt(karman.squared), forces[karman.chosen]
 
     def energy(x):
@@ -68,7 +91,6 @@ def resting(karman, forces):
 
 
 def middle_deflection(karman, pressure):
-    """Deflection of the middle under a uniform pressure, over the thickness."""
     plate = karman.modes.plate
     (x, of_x), (y, of_y) = (
         gauss_points(np.array([-size / 2, size / 2]), [80]) for size in (plate.size_x, plate.size_y)
@@ -79,10 +101,7 @@ def middle_deflection(karman, pressure):
 
 
 def strip_deflection(pressure, D, stretching, length, tension, clamped):
-    """Middle of a strip between two supports that do not move: D w'''' - T w'' = q, where T is the
-    tension at rest and the mean stretching; Timoshenko and Woinowsky-Krieger, Theory of Plates and
-    Shells (1959), articles 2 and 3.
-    """
+    """D w'''' - T w'' = q; Timoshenko and Woinowsky-Krieger (1959), articles 2 and 3."""
     nodes, weights = np.polynomial.legendre.leggauss(60)
     a = length / 2
 
@@ -109,18 +128,14 @@ def test_a_strip_between_two_edges_stretches_as_in_its_closed_form(support, tens
     )  # fmt: skip
     karman = reduced(plate, 30)
     for pressure, tolerance in ((0.05, 1e-4), (1.0, 5e-4), (10.0, 3e-3)):
-        exact = strip_deflection(
-            pressure, D, YOUNG * THICKNESS, SIDE, tension, support == "clamped"
-        )
+        given = D, YOUNG * THICKNESS, SIDE, tension, support == "clamped"
+        exact = strip_deflection(pressure, *given)
         found = middle_deflection(karman, pressure) * THICKNESS
         assert found == pytest.approx(exact, rel=tolerance)
 
 
 def least_energy_deflection(plate, pressure, terms, guess):
-    """Middle of a plate in a frame, over its thickness: the energy of w, u and v minimised at once
-    by Newton's method, u and v in sines, w in sines or, if it is clamped, in 1 - cos. Nine terms
-    along each side are within 0.05 % of eleven at 2.6 thicknesses.
-    """
+    """Middle in a frame, over the thickness: w, u, v by Newton's method in sines or 1 - cos."""
     a, b = plate.size_x, plate.size_y
     nodes, weights = np.polynomial.legendre.leggauss(4 * terms + 4)
     s, weights = (nodes + 1) / 2, weights / 2
@@ -178,12 +193,6 @@ def least_energy_deflection(plate, pressure, terms, guess):
     raise AssertionError("no minimum was found")
 
 
-ORTHOTROPIC = Plate(
-    size_x=0.12, size_y=0.09, d11=5e-4, d22=2e-4, d12=0.5e-4, d66=1e-4, mass_per_area=MASS,
-    air_density=0.0, tension_x=3.0, tension_y=1.0, **dict.fromkeys(FRAME, "simply"),
-)  # fmt: skip
-
-
 STRETCHED = framed("clamped", tension_x=4.0, tension_y=2.0)
 
 
@@ -192,13 +201,6 @@ def test_the_static_deflection_has_the_least_energy(plate, pressure):
     found = middle_deflection(reduced(plate, 60), pressure)
     exact = least_energy_deflection(plate, pressure, 9, found)
     assert found == pytest.approx(exact, rel=1e-3)
-
-
-# q a^4 / E h^4 and w / h of a clamped square plate, immovable in its plane, nu = 0.316: S. Levy,
-# Square Plate with Clamped Edges under Normal Pressure Producing Large Deflections, NACA TN 847
-# (1942). His few terms are too soft at large deflection: by 1.1 % at 0.9 h and 2.5 % at 1.9 h
-# compared with the least energy in cosines below.
-LEVY = ((38.3, 0.471), (134.9, 1.121), (402.0, 1.902))
 
 
 @pytest.mark.parametrize(("load", "deflection"), LEVY)
@@ -233,7 +235,6 @@ def test_the_first_mode_vibrates_faster_with_amplitude_as_in_chu_and_herrmann():
 
 
 def stirred(count, rng, height=2.0):
-    """Start of all modes, the first of which has a height in thicknesses."""
     plate = reduced(framed("clamped"), count)
     z = rng.standard_normal(count) / np.sqrt(plate.squared)
     z *= height * THICKNESS / abs(plate.shapes([[0.0, 0.0]])[0, 0] * z[0])
@@ -248,9 +249,6 @@ def test_energy_is_conserved_at_any_step():
     assert bending.max() < 1.5 * motion.energy[0]  # stretching takes energy, and gives none
 
 
-PLASTIC = from_young(young=YOUNG, poisson=0.3, density=800, loss_factor=0.1, viscosity=1e5)
-
-
 def test_loss_only_takes_energy():
     plate, start = stirred(12, np.random.default_rng(2))
     motion = forced_motion(plate, np.zeros((2000, 12)), 5e-5, PLASTIC, start=start)
@@ -258,25 +256,16 @@ def test_loss_only_takes_energy():
     assert motion.energy[-1] < 0.1 * motion.energy[0]
 
 
-DULL = from_young(young=YOUNG, poisson=0.3, density=800, loss_factor=0.6, viscosity=1e5)
-
-
-def relative_modulus(omega):
-    return DULL.complex_modulus(omega) / DULL.shear_modulus
-
-
 def test_at_small_amplitude_it_is_the_linear_plate():
     tension = 5.0
     plate = reduced(framed("clamped", tension_x=tension, tension_y=tension / 2), 20)
-    load, times, probe = (
-        circling(0.02, 12, 140, 0.5, peak_pressure=1e-3),
-        np.arange(5001) * 1e-4,
-        [[0.01, 0.005]],
-    )
+    load, probe = circling(0.02, 12, 140, 0.5, peak_pressure=1e-3), [[0.01, 0.005]]
+    times = np.arange(5001) * 1e-4
     linear = linear_motion(plate.modes, load, DULL, times)
     found = stretched_motion(plate, linear[:, plate.chosen], 1e-4, DULL).coordinates
     linear[:, plate.chosen] = found
-    f, amplitudes = plate_lines(plate.modes, load, probe, relative_modulus)
+    modulus = lambda w: DULL.complex_modulus(w) / DULL.shear_modulus  # noqa: E731
+    f, amplitudes = plate_lines(plate.modes, load, probe, modulus)
     late = times > 0.45
     steady = synthesise(f, amplitudes, times[late])[:, 0]
     moved = (linear @ plate.modes.at(probe)[0])[late]
@@ -305,31 +294,6 @@ def test_values_of_plates_out_of_range_are_refused():
             karman_plate(modes, thickness, **more)
 
 
-# The model of scenes
-
-
-SHEET = """
-[tacton]
-am_frequency_hz = 140
-duration_s = 0.02
-shape = "circle"
-size_mm = 8
-speed_m_per_s = 5
-[focus]
-peak_pressure_pa = PRESSURE
-[body]
-kind = "sheet"
-material = "paper"
-size_x_mm = 30
-size_y_mm = 30
-thickness_mm = 0.1
-[body.mounting]
-edges = ["left", "right"]
-[probes]
-points_mm = [[0, 0], [4, 0]]
-"""
-
-
 def sheet(pressure, more=""):
     return loads(SHEET.replace("PRESSURE", str(pressure)) + more)
 
@@ -343,7 +307,6 @@ def test_small_deflection_of_a_sheet_is_linear():
 
 
 def test_large_deflection_of_a_sheet_agrees_with_elements():
-    """At 0.7 thicknesses the linear motion is more than twice as large."""
     response, elements, linear = (
         compute(sheet(20), name)
         for name in ("plate-modes-nonlinear", "fem-nonlinear", "plate-modes-transient")

@@ -8,35 +8,19 @@ import pytest
 import read_results
 
 import fem
+import simple_model
 import skinwave
-from simple_model import (
-    Material,
-    MovingPressure,
-    PronyTerm,
-    Response,
-    Tacton,
-    Trajectory,
-    published_load,
-)
+from simple_model import PronyTerm, Tacton
 from skinwave.commands.cli import main
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import BODIES, Body, Layer
-from skinwave.studies.assumptions import (
-    DEVICE_RATES,
-    as_relaxing,
-    as_viscous,
-    can_be_alone,
-    device_path,
-    droppable,
-    side_step,
-    strongest_line,
-    without,
-)
+from skinwave.studies import assumptions
+from skinwave.studies.assumptions import as_relaxing, can_be_alone, device_path, droppable, without
 from skinwave.studies.relax import Hierarchy, HierarchyStep, hierarchy_of, line_changes
 
-PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
-LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
+PATH = simple_model.Trajectory(shape="circle", size=0.02, speed=12.0)
+LOAD = simple_model.MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
 SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.04, height=0.04), probes=((0.01, 0.0),))
 PAPER = replace(SKIN, body=replace(BODIES["paper-sheet-loose"], width=0.05, height=0.05))
 
@@ -46,10 +30,10 @@ def test_assumptions_of_slab_and_sheet():
         "linear drive", "sinc^2 profile", "no propagation", "little loss", "laterally-infinite",
         "main lobe only", "continuous path", "one material", "flat",
     )  # fmt: skip
-    assert side_step(SKIN) == (
+    assert assumptions.side_step(SKIN) == (
         "linear drive", "sinc^2 profile", "no propagation", "little loss", "viscous loss",
     )  # fmt: skip
-    assert side_step(PAPER) == ()
+    assert assumptions.side_step(PAPER) == ()
     assert droppable(PAPER) == (
         "linear drive", "sinc^2 profile", "no propagation", "laterally-infinite", "vacuum",
         "main lobe only",
@@ -103,7 +87,7 @@ def test_an_infinite_body_of_elements_has_absorbing_sides():
 def test_first_and_last_models_of_the_hierarchy():
     scene, model = without(SKIN, ())
     assert (scene.body.kind, model) == ("none", "point-kernel-published")
-    assert scene.pressure == published_load(SKIN.pressure)
+    assert scene.pressure == simple_model.published_load(SKIN.pressure)
     scene, model = without(SKIN, droppable(SKIN))
     assert model == "fem"
     assert scene.body.kind == "palm"
@@ -116,8 +100,8 @@ def test_first_and_last_models_of_the_hierarchy():
 
 
 def test_a_device_rests_on_equally_spaced_points():
-    most = device_path(PATH, DEVICE_RATES[1])
-    assert len(most.points) - 1 == round(DEVICE_RATES[1] / PATH.drawing_frequency)
+    most = device_path(PATH, assumptions.DEVICE_RATES[1])
+    assert len(most.points) - 1 == round(assumptions.DEVICE_RATES[1] / PATH.drawing_frequency)
     path = device_path(PATH, points=5)
     assert path.hold
     assert path.drawing_frequency == pytest.approx(PATH.drawing_frequency)
@@ -150,7 +134,7 @@ def test_damping_laws_agree_at_the_fitted_frequency():
         assert relaxing.shear_modulus >= 0.499 * viscous.shear_modulus
         assert relaxing.complex_modulus(w) == pytest.approx(viscous.complex_modulus(w), rel=1e-12)
         assert relaxing.complex_modulus(3 * w).imag < 0.9 * viscous.complex_modulus(3 * w).imag
-        back = as_viscous(relaxing, w)
+        back = assumptions.as_viscous(relaxing, w)
         assert (back.prony, back.viscosity) == ((), pytest.approx(viscous.viscosity))
         assert back.shear_modulus == pytest.approx(viscous.shear_modulus)
 
@@ -158,7 +142,7 @@ def test_damping_laws_agree_at_the_fitted_frequency():
 @pytest.mark.parametrize("material", ["palm", "palm-zener"])
 def test_little_loss_is_a_tenth_at_the_same_stiffness(material):
     own = replace(SKIN, body=replace(SKIN.body, material=material))
-    w = 2 * np.pi * strongest_line(own)
+    w = 2 * np.pi * assumptions.strongest_line(own)
     little, all_of_it = (
         without(own, ("no propagation", *dropped))[0].body.solid.complex_modulus(w)
         for dropped in ((), ("little loss",))
@@ -168,9 +152,9 @@ def test_little_loss_is_a_tenth_at_the_same_stiffness(material):
     assert all_of_it == pytest.approx(own.body.solid.complex_modulus(w), rel=1e-9)
 
 
-@pytest.mark.parametrize("law", [as_relaxing, as_viscous])
+@pytest.mark.parametrize("law", [as_relaxing, assumptions.as_viscous])
 def test_a_change_of_damping_law_keeps_hysteresis(law):
-    both = Material(
+    both = simple_model.Material(
         density=1000, shear_modulus=25e3, poisson=0.49, loss_factor=0.2,
         **({"viscosity": 5.0} if law is as_relaxing else
            {"prony": (PronyTerm(modulus=1e4, time=5e-4), PronyTerm(modulus=5e3, time=2e-3))}),
@@ -186,13 +170,13 @@ def test_the_damping_law_is_one_step():
     )
     assert model == "flat-body"
     assert before.body.solid == SKIN.body.solid
-    line = 2 * np.pi * strongest_line(SKIN)
+    line = 2 * np.pi * assumptions.strongest_line(SKIN)
     laws = [scene.body.solid.complex_modulus(line) for scene in (before, after)]
     assert laws[1] == pytest.approx(laws[0], rel=1e-9)
     # A body that relaxes keeps its own law at the end, and has its viscous twin before.
     own = replace(SKIN, body=replace(SKIN.body, material="palm-zener"))
     assert "viscous loss" in droppable(own)
-    assert side_step(own) == ()
+    assert assumptions.side_step(own) == ()
     before, _ = without(own, ("no propagation", "little loss"))
     after, _ = without(own, ("no propagation", "little loss", "viscous loss"))
     assert before.body.solid.fast_modulus == 0 < before.body.solid.viscosity
@@ -239,7 +223,9 @@ def test_relax_writes_effects_and_costs(tmp_path, monkeypatch, capsys):
 
 def test_a_step_after_a_failed_one_has_no_effect():
     times = np.arange(4.0)
-    told = Response(model="fem", times=times, probes=np.zeros((1, 2)), values=times[:, None])
+    told = simple_model.Response(
+        model="fem", times=times, probes=np.zeros((1, 2)), values=times[:, None]
+    )
     steps = [
         HierarchyStep(name=name, dropped=dropped, model="fem", response=response)
         for name, dropped, response in (

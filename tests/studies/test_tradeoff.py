@@ -4,21 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from corpus import SHORT
 
 from skinwave.scene.file import loads
 from skinwave.studies.tradeoff import Candidate, study, write
-
-SHORT = """
-name = "short"
-[tacton]
-am_frequency_hz = 140
-duration_s = 0.05
-[body]
-size_x_mm = 60
-size_y_mm = 60
-[probes]
-points_mm = [[0, 0], [5, 0]]
-"""
 
 
 @pytest.mark.slow

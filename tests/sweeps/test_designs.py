@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from skinwave.scene.distributions import (
-    Distribution,
-    Spread,
-    parse_distribution,
-    uniform,
-    within_factor,
-)
+from skinwave.scene import distributions
+from skinwave.scene.distributions import Distribution, parse_distribution, uniform, within_factor
 from skinwave.scene.file import read
 from skinwave.scene.variation import cases, combinations, parse, saltelli_shares
 from skinwave.sweeps.sampling import one_at_a_time, samples, sobol_indices
@@ -74,7 +69,6 @@ def test_any_key_of_a_scene_can_be_varied(scene):
 
 
 def test_the_spreads_of_presets_can_be_varied(scene):
-    """All moduli or all losses of a material times a factor, by the keys that samples have."""
     texts = ("body.material.modulus_scale=factor(1,3)", "body.material.loss_scale=0.5:2")
     met = combinations(varied(*texts), "sobol", 4)
     plain = read(scene).body.solid
@@ -93,7 +87,9 @@ def test_distributions_of_a_sweep():
         ("factor(50,2)", 50, within_factor(2)),
         ("triangular(10,12,20)", 12, bounds("triangular", 10, 20)),
     ):
-        assert parse_distribution("x", text) == Spread(key="x", value=value, distribution=given)
+        assert parse_distribution("x", text) == distributions.Spread(
+            key="x", value=value, distribution=given
+        )
     assert parse_distribution("x", "palm") is None
     with pytest.raises(ValueError, match="2 numbers"):
         parse_distribution("x", "uniform(1)")
@@ -155,11 +151,8 @@ def test_indices_and_tornadoes_of_a_sum():
 
 def test_indices_of_an_output_that_hardly_varies_are_finite():
     x = quantiles(numbers(2, 0, 1), saltelli_shares(2, 8))
-    for y in (
-        np.full(len(x), 0.1),
-        np.full(len(x), 1e6) + 1e-10 * x[:, 0],
-        np.where(np.arange(len(x)) < 16, 1.0, x[:, 0]),
-    ):  # the last varies in the mixed matrices alone
+    mixed = np.where(np.arange(len(x)) < 16, 1.0, x[:, 0])  # varies in the mixed matrices alone
+    for y in (np.full(len(x), 0.1), np.full(len(x), 1e6) + 1e-10 * x[:, 0], mixed):
         found = sobol_indices(y, 2)
         for each in (found.first, found.total, found.first_error, found.total_error):
             np.testing.assert_array_equal(each, 0)

@@ -68,9 +68,6 @@ def test_the_forearm_deflects_most_near_the_rayleigh_speed(tmp_path, monkeypatch
     assert max(found, key=found.get) == pytest.approx(rows[0]["rayleigh_speed_m_per_s"], rel=0.15)
 
 
-# Reductions
-
-
 def test_bodies_are_prepared_once(scene, monkeypatch):
     prepared, inner = [], reductions.prepare
     counting = lambda *a, **k: prepared.append((a, k)) or inner(*a, **k)  # noqa: E731
@@ -83,7 +80,6 @@ def test_bodies_are_prepared_once(scene, monkeypatch):
 
 
 def counted(monkeypatch, folder):
-    """Factorisations from here on, with a cache of their own."""
     monkeypatch.setenv("SKINWAVE_CACHE", str(folder))
     reductions.prepare_body.cache_clear()
     covering.cached_shared_body.cache_clear()
@@ -129,7 +125,6 @@ def test_bodies_of_many_materials_are_reduced_together(scene, monkeypatch, tmp_p
     [(f"{SCALED}=0.8,1.3,2.0", slice(None)), ("body.thickness_mm=10,11,12", slice(2, None))],
 )
 def test_factors_and_thicknesses_share_a_reduction(scene, monkeypatch, vary, kept):
-    """The thickest body has the mesh of its own."""
     with monkeypatch.context() as patch:
         patch.setattr(covering, "FEWEST", 3)
         patch.setattr(covering, "FEWEST_OF_THICKNESS", 3)

@@ -12,7 +12,6 @@ from which_sheet import fill, hypercube, information, nearest, share
 
 
 def row_of(candidate):
-    """A row in which the drive law decides M1 and the loss the level of the strongest rival."""
     level = 1000 * candidate["loss_factor"] - 30
     values = {"M1": -40.0, "M2": 0.0, "M3": -30.0, "M4": level, "M5": level - 1}
     shown = dict.fromkeys(values, 1)

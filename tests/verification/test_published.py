@@ -11,25 +11,10 @@ from scipy.special import i0e
 from simple_model.load.focus import spot_width
 from skinwave.commands.cli import main
 from skinwave.system.effort import silent
-from skinwave.verify import predictions
+from skinwave.verify import predictions, validation
 from skinwave.verify.predictions import BODIES, Finger, decay_exponents, focus_speeds, leading_wave
-from skinwave.verify.published import (
-    LENGTH,
-    OPTIMUM,
-    SPEED,
-    WAVES,
-    all_sources,
-    rayleigh_wave,
-)
-from skinwave.verify.validation import (
-    ABOVE,
-    BELOW,
-    NONE,
-    WITHIN,
-    compare_finger,
-    compare_set,
-    compare_waves,
-)
+from skinwave.verify.published import LENGTH, OPTIMUM, SPEED, WAVES, all_sources, rayleigh_wave
+from skinwave.verify.validation import ABOVE, BELOW, WITHIN, compare_finger, compare_set
 
 SPREAD = replace(
     OPTIMUM, frequencies=(1.0, 2.0, 3.0, 4.0, 5.0), values=(nan,) * 5, lows=(2.0,) * 5,
@@ -41,7 +26,7 @@ HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
 
 def test_factor_is_relative_to_the_nearer_end_of_the_spread():
     rows = compare_set(SPREAD, "palm-layers", [1.0, 3.0, 8.0, nan, inf])
-    assert [row.outcome for row in rows] == [BELOW, WITHIN, ABOVE, NONE, ABOVE]
+    assert [row.outcome for row in rows] == [BELOW, WITHIN, ABOVE, validation.NONE, ABOVE]
     assert [row.factor for row in rows[:3]] == [0.5, 1.0, 2.0]
     assert not rows[0].is_built
     assert compare_set(SPREAD, "palm", [1.0])[0].is_built
@@ -103,7 +88,7 @@ def test_all_sources_span_the_single_sources():
 
 
 def test_each_published_set_has_a_row_for_each_body(curves):
-    rows = compare_waves(curves)
+    rows = validation.compare_waves(curves)
     for each in WAVES:
         assert each.source
         assert set(each.built) <= set(BODIES)
