@@ -45,10 +45,9 @@ def test_run_with_each_model(scene, model):
 
 
 @pytest.mark.usefixtures("in_one_process")
-def test_compare_a_scene_of_ones_own(scene, capsys):
+def test_compare_a_scene_of_ones_own(scene):
     scene.write_text(CLAMPED.replace("0.05", "0.3"))  # to tell lines apart
     assert main(["compare", str(scene), "--element-size", "6", "--out", "both"]) == 0
-    assert "3 of 3 runs" in capsys.readouterr().out
     folder = scene.parent / "both"
     rows = read_results.rows(folder / "lines.csv")
     assert ",".join(rows[0]) == (
@@ -69,8 +68,6 @@ def test_compare_a_scene_of_ones_own(scene, capsys):
 
 
 def test_plan_gives_a_reason_for_every_row(scene, capsys):
-    assert main(["plan", str(scene), "--tolerance", "0.02"]) == 0
-    assert "flat-body" in capsys.readouterr().out
     scene.write_text(GOOD)  # its sides are clamped
     assert main(["plan", str(scene), "--json"]) == 0
     required = json.loads(capsys.readouterr().out)
@@ -79,7 +76,7 @@ def test_plan_gives_a_reason_for_every_row(scene, capsys):
     assert all(row["reason"] for row in required["rows"])
 
 
-def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_path, capsys):
+def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_path):
     monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / "cache"))
     scene.write_text(GOOD)  # soon reduced
     run = ["run", str(scene), "--model", "fem", "--element-size", "10", "--quiet", "--overwrite"]
@@ -91,9 +88,6 @@ def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_pa
     assert kept
     assert main([*run, "--no-cache"]) == 0
     assert {p: p.stat().st_mtime_ns for p in (tmp_path / "cache").iterdir()} == kept
-    with pytest.raises(SystemExit):
-        main(["run", "--help"])
-    assert "SKINWAVE_CACHE" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("terminal", [False, True])

@@ -181,7 +181,6 @@ def test_what_a_scan_has():
     assert list(found.constant) == [3]
     assert (found.clipped.sum(axis=0) > 100).tolist() == [False, False, True, False]
     assert found.missing == ()
-    assert "Clipped" in text(found)
     bare = inspect(scan(drive=[], values=scan().values[:1], places=np.full((4, 2), np.nan)))
     assert len(bare.missing) == 3
 
@@ -212,8 +211,6 @@ def test_short_and_extreme_measurements_are_inspected():
 def test_the_command_prints_and_writes(tmp_path, capsys):
     path, out = tmp_path / "scan.npz", tmp_path / "out"
     write(scan(), path)
-    assert main(["fit", "--inspect", str(path)]) == 0
-    assert "2 repetitions: 2,000 samples" in capsys.readouterr().out
     assert main(["fit", "--inspect", str(path), "--out", str(out), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     (line,) = (line for line in told["lines"] if abs(line["frequency_hz"] - 140) < 1)

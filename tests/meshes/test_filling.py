@@ -143,6 +143,4 @@ def test_a_bone_inside_a_body_is_a_region_of_scenes(tmp_path, monkeypatch, capsy
     stiff = [made.material[r] is fem.PRESETS["bone"] for r in made.mesh.region.tolist()]
     assert stiff == (mesh.region == 1).tolist()
     assert main([*command, "--inner", bone, "--overwrite"]) == 2
-    assert "a second region 'bone'" in capsys.readouterr().err
     assert main(["mesh", out, "--inner", bone, "-o", str(tmp_path / "b.vtu")]) == 2
-    assert "is a mesh, which cannot" in capsys.readouterr().err

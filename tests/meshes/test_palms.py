@@ -5,8 +5,9 @@ from functools import partial
 
 import numpy as np
 import pytest
-from flat_palms import FLAT, grid, measures, rounded_slab
+from scipy.integrate import quad
 
+import fem
 import meshes
 from meshes import MeshError, Palm, TetMesh, corner_volumes, mapped_palm
 from meshes.shapes import palm as shape
@@ -14,6 +15,11 @@ from meshes.volume.mapped_palm import kuhn_tets
 from skinwave.bodies import palm as body_palm
 from skinwave.bodies.body import Body
 from skinwave.scene.scene import BODIES, Relief
+
+FLAT = Palm(
+    cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, thickness=0.015,
+    edge_radius=0.007,
+)  # fmt: skip
 
 
 def test_the_gradient_is_the_slope_of_the_level_set():
@@ -134,3 +140,33 @@ def test_facets_hidden_from_above_are_not_the_top():
     assert set(mesh.points[mesh.facets["top"]][..., 2].ravel()) == {0.03}
     assert len(mesh.facets["top"]) == 4
     assert len(mesh.facets["below"]) == len(mesh.facets["surface"]) - 4
+
+
+def grid(palm, cell):
+    across = (np.linspace(-side / 2, side / 2, 2 * round(side / 2 / cell) + 1)
+              for side in (palm.breadth, palm.length))  # fmt: skip
+    return *across, np.linspace(-palm.thickness, 0, round(palm.thickness / cell) + 1)
+
+
+def measures(mesh):
+    """Volume and area within curved boundary facets; the volume is exact for ten-node elements."""
+    facets = meshes.boundary_facets(mesh.tets)
+    _, normals = fem.load_and_probe.facet_geometry(mesh, facets)
+    at = fem.facet_points(mesh, facets).reshape(normals.shape)
+    return np.einsum("eqi,eqi->", at, normals) / 3, np.linalg.norm(normals, axis=2).sum()
+
+
+def rounded_slab(palm):
+    """Volume and area of a palm without relief, by the insets of its outline."""
+    half, r, e = np.array([palm.breadth, palm.length]) / 2, palm.corner_radius, palm.edge_radius
+
+    def inset(d):
+        return 4 * np.prod(half - d) - (4 - np.pi) * (r - d) ** 2
+
+    def around(d):
+        return 4 * (half - d).sum() - (8 - 2 * np.pi) * (r - d)
+
+    wall = palm.thickness - 2 * e
+    rim = quad(lambda a: inset(e * (1 - np.cos(a))) * e * np.cos(a), 0, np.pi / 2)[0]
+    curved = quad(lambda a: around(e * (1 - np.cos(a))) * e, 0, np.pi / 2)[0]
+    return inset(0) * wall + 2 * rim, around(0) * wall + 2 * (curved + inset(e))

@@ -29,6 +29,14 @@ WRONG_COMMANDS = (
     "good.wav out.toml --role sound", "good.wav out.toml --scale loud",
     "good.wav out.toml --role envelope",
 )  # fmt: skip
+POINT = brush(radius=0.0)
+BACK = jump("near", "lt", 1.0, 0.0)
+CIRCUIT = [
+    keyframe(0, LEFT, POINT),
+    keyframe(500, RIGHT, POINT) | {"cjumps": [BACK]},
+    keyframe(800, (10.0, 30.0), POINT) | {"cjumps": [jump("near", "gt_eq", 2.0, 600.0)]},
+    stop(1000),
+]
 
 
 def imported(folder, content, suffix=".adaptics", **options):
@@ -110,16 +118,6 @@ def test_a_lissajous_is_recorded_as_the_engine_draws_it(tmp_path):
     expected = np.stack([0.010 * np.sin(2 * u + 0.5), 0.006 * np.sin(3 * u)], -1)
     np.testing.assert_allclose(scene.tacton.trajectory.position(t), expected, atol=2e-5)
     assert any("20000 Hz" in note for note in notes)
-
-
-POINT = brush(radius=0.0)
-BACK = jump("near", "lt", 1.0, 0.0)
-CIRCUIT = [
-    keyframe(0, LEFT, POINT),
-    keyframe(500, RIGHT, POINT) | {"cjumps": [BACK]},
-    keyframe(800, (10.0, 30.0), POINT) | {"cjumps": [jump("near", "gt_eq", 2.0, 600.0)]},
-    stop(1000),
-]
 
 
 @pytest.mark.parametrize(

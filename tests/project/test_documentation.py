@@ -1,9 +1,11 @@
-"""The README and the pages of docs/: what they show works, and what they link to is there."""
+"""README, pages, docstrings and notebook: what they show works, and what they link to is there."""
 
 import ast
+import doctest
 import re
 import shlex
 import warnings
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,14 @@ from skinwave.commands import cli
 ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 OTHERS = [page for page in PAGES if page.stem not in WRITTEN]
+PACKAGES = ("fem", "meshes", "simple_model", "skinwave")
+MODULES = sorted(
+    path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".")
+    for package in PACKAGES
+    for path in (ROOT / package).rglob("*.py")
+    if ">>> " in path.read_text(encoding="utf-8")
+)
+NOTEBOOK = ROOT / "examples/notebook.ipynb"
 
 
 def code_blocks(language, pages=PAGES):
@@ -46,16 +56,6 @@ def test_files_that_pages_name_exist():
     }
     assert len(named) > 30
     assert [file for file in sorted(named) if not (ROOT / file).exists()] == []
-
-
-def test_pictures_of_the_gallery_are_of_scripts_that_there_are():
-    named = {
-        (page.stem, script)
-        for page in PAGES
-        for script in re.findall(r"sphx_glr_(\w+)_\d{3}\.png", page.read_text("utf-8"))
-    }
-    assert {"propagation", "elements", "silicone-disc"} <= {page for page, _ in named}
-    assert [x for x in named if not (ROOT / f"examples/gallery/{x[1]}.py").exists()] == []
 
 
 def test_every_scene_that_the_documentation_shows_is_one():
@@ -95,3 +95,31 @@ def test_scripts_of_the_gallery_are_short_and_assert_a_number():
         lines = text.count("\n") - (ast.get_docstring(tree) or "").count("\n")
         assert 20 <= lines <= 70, path
         assert any(isinstance(node, ast.Assert) for node in tree.body), path
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_of_docstrings_run(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    options = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+    results = doctest.testmod(import_module(name), optionflags=options)
+    assert results.attempted
+    assert not results.failed
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")  # of the libraries of notebooks
+def test_the_notebook_runs(monkeypatch):
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # by which figures would not be inline
+    client = pytest.importorskip("nbclient")
+    nbformat = pytest.importorskip("nbformat")
+    pytest.importorskip("ipykernel")
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    assert len(notebook.cells) == 15
+    assert not any(cell.get("outputs") for cell in notebook.cells)  # which would be out of date
+    place = {"metadata": {"path": str(NOTEBOOK.parent)}}
+    client.NotebookClient(notebook, timeout=300, resources=place).execute()
+    shown = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    kinds = [set(output.get("data", {})) for output in shown]
+    # Of scene, plan, response, comparison and table; waveforms, lines and the figure.
+    for kind, count in (("text/html", 5), ("image/png", 3)):
+        assert sum(kind in each for each in kinds) == count

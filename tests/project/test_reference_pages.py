@@ -78,14 +78,3 @@ def test_the_page_of_the_verification_has_all_cases_and_their_sources():
     page = generated.verification()
     assert f"has {len(CASES)} cases" in page
     assert all(f"`{name}`" in page for name in CASES)
-
-
-def test_links_beyond_the_pages_lead_to_pages_of_the_site():
-    for text, expected in (
-        ("[a](../bench) b", "[a](reference/benchmarks) b"),
-        ("[a](method.md#x)", "[a](method.md#x)"),
-        ("[a](../examples/gallery/02_drive_laws.py)", "[a](gallery/02_drive_laws)"),
-        ("[a](../fem)", "a"),
-        ("[a](https://doi.org/x)", "[a](https://doi.org/x)"),
-    ):
-        assert generated.with_site_links(text, ROOT / "docs", ROOT / "docs") == expected

@@ -11,7 +11,6 @@ from importlib.util import find_spec
 from io import BytesIO
 from itertools import combinations
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -156,8 +155,6 @@ def test_a_long_pattern_is_played_in_part():
     span, frames = playback.played_part(load, 300.0)
     assert frames == playback.MOST_FRAMES
     assert frames / (span * 300.0) >= playback.FRAMES_PER_PERIOD
-    said = films.played_text(SimpleNamespace(scene=Scene(pressure=load, body=Body()), period=span))
-    assert "2,000 ms long" in said
 
 
 def test_the_number_of_frames_follows_from_the_fastest_line(scene, moved):
@@ -249,7 +246,6 @@ def test_vector_figures_keep_text_as_text(page):
     for name in ("propagation", "snapshots"):
         assert (page / f"pictures/{name}.png").stat().st_size > 10_000
         svg = (page / f"pictures/{name}.svg").read_text()
-        assert "skin slab" in re.sub("<[^>]+>", " ", svg)
         assert svg.count("<text") > 10
         assert 'id="DejaVu' not in svg  # no glyph as a path
         pdf = (page / f"pictures/{name}.pdf").read_bytes()

@@ -15,7 +15,7 @@ from skinwave.commands.cli import main
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import BODIES, Body, Layer
-from skinwave.studies import assumptions
+from skinwave.studies import assumptions, relax
 from skinwave.studies.assumptions import as_relaxing, can_be_alone, device_path, droppable, without
 from skinwave.studies.relax import Hierarchy, HierarchyStep, hierarchy_of, line_changes
 
@@ -36,8 +36,7 @@ def test_assumptions_of_slab_and_sheet():
     assert assumptions.side_step(PAPER) == ()
     assert droppable(PAPER) == (
         "linear drive", "sinc^2 profile", "no propagation", "laterally-infinite", "vacuum",
-        "main lobe only",
-        "continuous path", "small deflection",
+        "main lobe only", "continuous path", "small deflection",
     )  # fmt: skip
     with pytest.raises(ValueError, match="assumption"):
         droppable(replace(SKIN, body=BODIES["none"]))
@@ -70,12 +69,8 @@ def test_each_step_of_load_and_propagation_changes_one_thing(own):
 def test_an_infinite_body_of_elements_has_absorbing_sides():
     thin = replace(SKIN, body=replace(SKIN.body, depth=0.004, sides="clamped"))
     names = droppable(thin)
-    body = {
-        name: without(thin, [n for n in names if n != name])[0].body
-        for name in ("laterally-infinite", "flat")
-    }
-    assert body["laterally-infinite"].sides == "absorbing"
-    assert body["flat"].sides == "clamped"
+    for name, sides in (("laterally-infinite", "absorbing"), ("flat", "clamped")):
+        assert without(thin, [n for n in names if n != name])[0].body.sides == sides
     assert can_be_alone("laterally-infinite", names, thin)
     for kept in ({"sides": "absorbing"}, {"base": "free"}):  # no other body; none that stays
         other = replace(thin, body=replace(thin.body, **kept))
@@ -164,10 +159,9 @@ def test_a_change_of_damping_law_keeps_hysteresis(law):
 
 
 def test_the_damping_law_is_one_step():
-    before, _ = without(SKIN, ("sinc^2 profile", "no propagation", "little loss"))
-    after, model = without(
-        SKIN, ("sinc^2 profile", "no propagation", "little loss", "viscous loss")
-    )
+    names = ("sinc^2 profile", "no propagation", "little loss")
+    before, _ = without(SKIN, names)
+    after, model = without(SKIN, (*names, "viscous loss"))
     assert model == "flat-body"
     assert before.body.solid == SKIN.body.solid
     line = 2 * np.pi * assumptions.strongest_line(SKIN)
@@ -188,10 +182,8 @@ def test_the_damping_law_is_one_step():
 def test_relax_writes_effects_and_costs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     scene = replace(SKIN, body=Body(width=0.032, height=0.032, depth=0.004))  # too thin for layers
-    monkeypatch.setattr(
-        "skinwave.studies.relax.droppable",
-        lambda scene: tuple(n for n in droppable(scene) if n not in ("flat", "one material")),
-    )
+    names = tuple(n for n in droppable(scene) if n not in ("flat", "one material"))
+    monkeypatch.setattr(relax, "droppable", lambda scene: names)
     (tmp_path / "scene.toml").write_text(dumps(scene))
     assert main(["relax", "scene.toml", "--element-size", "9", "--quiet"]) == 0
     coarse = "elements of 9 mm are too coarse for the focal spot"
@@ -223,30 +215,28 @@ def test_relax_writes_effects_and_costs(tmp_path, monkeypatch, capsys):
 
 def test_a_step_after_a_failed_one_has_no_effect():
     times = np.arange(4.0)
-    told = simple_model.Response(
-        model="fem", times=times, probes=np.zeros((1, 2)), values=times[:, None]
+    given = {"times": times, "probes": np.zeros((1, 2)), "values": times[:, None]}
+    told = simple_model.Response(model="fem", **given)
+    steps = tuple(
+        HierarchyStep(name=name, dropped=tuple(name), model="fem", response=response)
+        for name, response in (("", told), ("a", None), ("ab", told), ("abc", told))
     )
-    steps = [
-        HierarchyStep(name=name, dropped=dropped, model="fem", response=response)
-        for name, dropped, response in (
-            ("as published", (), told), ("a", ("a",), None), ("b", ("a", "b"), told),
-            ("c", ("a", "b", "c"), told),
-        )
-    ]  # fmt: skip
-    found = Hierarchy(scene=SKIN, steps=tuple(steps), side_steps=(), leave_one_out=())
-    assert [(a.name, b.name) for a, b in found.pairs()] == [("b", "c")]
+    found = Hierarchy(scene=SKIN, steps=steps, side_steps=(), leave_one_out=())
+    assert [(a.name, b.name) for a, b in found.pairs()] == [("ab", "abc")]
+
+
+def pretend(monkeypatch, names, step):
+    """Other assumptions, and other scenes and models without them."""
+    monkeypatch.setattr(relax, "droppable", lambda scene: names)
+    monkeypatch.setattr(relax, "without", lambda scene, dropped, **device: step(scene, dropped))
+    monkeypatch.setattr(relax, "all_warnings", lambda *scene, h: ())
 
 
 def test_a_failed_step_leaves_the_others(monkeypatch):
-    monkeypatch.setattr(
-        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "one material")
-    )
-    monkeypatch.setattr(
-        "skinwave.studies.relax.without",
-        lambda scene, dropped, **device: (
-            replace(scene, body=replace(scene.body, depth=0.001)), "flat-body",
-        ) if not dropped else (scene, "no such model"),
-    )  # fmt: skip
+    thin = replace(SKIN, body=replace(SKIN.body, depth=0.001))
+    steps = {False: (thin, "flat-body"), True: (SKIN, "no such model")}
+    names = ("linear drive", "one material")
+    pretend(monkeypatch, names, lambda scene, dropped: steps[bool(dropped)])
     found = hierarchy_of(SKIN, lambda phase, done: None)
     assert found.steps[0].response is not None
     assert all("no such model" in step.error for step in found.steps[1:])
@@ -255,15 +245,9 @@ def test_a_failed_step_leaves_the_others(monkeypatch):
 
 @pytest.mark.usefixtures("in_one_process")
 def test_a_shared_body_is_reduced_once(monkeypatch):
-    small = Body(width=0.03, height=0.03, depth=0.004)
-    monkeypatch.setattr(
-        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "sinc^2 profile")
-    )
-    monkeypatch.setattr(
-        "skinwave.studies.relax.without",
-        lambda scene, dropped, **device: (replace(scene, body=small), "fem"),
-    )
-    monkeypatch.setattr("skinwave.studies.relax.all_warnings", lambda *scene, h: ())
+    small = replace(SKIN, body=Body(width=0.03, height=0.03, depth=0.004))
+    names = ("linear drive", "sinc^2 profile")
+    pretend(monkeypatch, names, lambda scene, dropped: (small, "fem"))
     found = hierarchy_of(SKIN, lambda phase, done: None, h=4e-3).steps
     first, *others = [step.response.effort.seconds for step in found]
     reduction = {"assemble", "factorise and reduce"}
@@ -284,17 +268,11 @@ def test_a_body_that_cannot_be_reduced_is_refused_on_a_coarse_mesh(monkeypatch):
             raise fem.NotReduced("200 moments leave an error")
         return compute(scene, model)
 
-    monkeypatch.setattr("skinwave.studies.relax.compute", not_reduced)
-    monkeypatch.setattr("skinwave.studies.relax.all_warnings", lambda *scene, h: ())
-    monkeypatch.setattr(
-        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "little loss", "flat")
-    )
-    monkeypatch.setattr(
-        "skinwave.studies.relax.without",
-        lambda scene, dropped, **device: (
-            scene, "fem" if set(dropped) == {"linear drive", "flat"} else "point-kernel",
-        ),
-    )  # fmt: skip
+    def step(scene, dropped):
+        return scene, "fem" if set(dropped) == {"linear drive", "flat"} else "point-kernel"
+
+    monkeypatch.setattr(relax, "compute", not_reduced)
+    pretend(monkeypatch, ("linear drive", "little loss", "flat"), step)
     found = hierarchy_of(SKIN, lambda phase, done: None, h=5e-3)
     (failed,) = [step for step in found.every if step.error]
     assert failed.name == "all but: little loss"
