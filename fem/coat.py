@@ -42,10 +42,10 @@ from simple_model.layers.material import Material
 
 QUADRATIC = 6  # nodes of a facet
 STATIONS, STATION_WEIGHTS = np.polynomial.legendre.leggauss(2)  # through each layer, along edges
-# Penalty over D L / A, with bending stiffness D and area A of a facet and length L of its edge. It
-# is the least for which the stiffness of a facet bounds its moments at three edges: int m^2 ds <=
-# L/A int m^2 dA for the constant moments of quadratic facets. A larger penalty makes bending too
-# stiff; with 0.85 of this one some modes have negative stiffness.
+# Penalty over D L / A, with bending stiffness D and area A of a facet and length L of its edge: the
+# smallest for which the stiffness of a facet bounds its moments at three edges, int m^2 ds <= L/A
+# int m^2 dA for the constant moments of quadratic facets. A larger penalty makes bending too stiff;
+# with 0.85 of this one some modes have negative stiffness.
 PENALTY = 3 / 4
 
 

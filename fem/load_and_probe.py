@@ -14,13 +14,13 @@ from fem.sparsity import dofs_of, from_entries
 from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
 
-FACET_MARGIN = 1e-6  # barycentric: a point so little outside a facet counts as on it
+FACET_MARGIN = 1e-6  # barycentric: points this close outside a facet count as on it
 NEWTON_TOLERANCE = 1e-9  # of a facet's size
 NEWTON_STEPS, NEWTON_REACH = 12, 3.0  # most steps; barycentric coordinate beyond which it stops
 EDGE_ON_AREA = 1e-9  # of a facet's squared size: the projected area of a facet seen edge-on
 SAME_HEIGHT = 1e-6  # of the surface's extent: neighbouring facets with this difference are level
 AT_ONCE = 2_000_000  # pairs of points and facets
-ELEMENT_MARGIN = 1e-6  # barycentric: a point so little outside all elements counts as inside
+ELEMENT_MARGIN = 1e-6  # barycentric: points this close outside all elements count as inside
 BOWED_MARGIN = 0.3  # of an element's size: likewise for the straight element of a curved one
 BULGE = 0.05  # of an element's size: how far a curved element may extend beyond its corners
 NODES = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])  # of a facet

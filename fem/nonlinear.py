@@ -26,7 +26,7 @@ MOST_ITERATIONS = 25
 MOST_HALVINGS = 6  # of a load or time step
 SLOW = 0.3  # ratio of successive corrections above which the tangent is factorised again
 ROUND_OFF = 1e-5  # of the load: a smaller residual is judged by the correction it causes
-STANDSTILL = 1e-6  # of the displacement: the least scale of a step's correction
+STANDSTILL = 1e-6  # of the displacement: smallest scale of a step's correction
 
 
 class _Stuck(ArithmeticError):
@@ -262,8 +262,8 @@ class _March:
             left = dt**2 / 4 * float(np.linalg.norm(change)) / (step or 1.0)
             shrinks = left <= max(SLOW * before, tolerance / 100)
             if left <= tolerance and (shrinks or before <= tolerance):
-                # One more residual would only confirm what this correction leaves: its square or,
-                # with an old tangent, a small part of it. The balance of forces replaces it.
+                # The remaining error is the square of this correction or, with an old tangent, a
+                # small part of it. The balance of forces replaces another residual.
                 u, v = u + dt**2 / 4 * change, v + dt / 2 * change
                 internal = load - M @ (a + now.a) - now.internal
                 strain, stretch = self._branch_stretches(now, u, shares)

@@ -25,7 +25,7 @@ from fem.typing import Floats, Ints
 from meshes import TetMesh
 
 PAIRS = ((0, 0), (1, 1), (0, 1))  # xx, yy, xy
-EDGE_MARGIN = 1e-9  # barycentric: a point so little outside all triangles is on the sheet
+EDGE_MARGIN = 1e-9  # barycentric: points this close outside all triangles are on the sheet
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -37,7 +37,7 @@ from meshes.tetmesh import EDGES
 from simple_model.layers.material import Material
 from simple_model.layers.tensors import DIAGONAL, MEAN, TENSOR
 
-TOUCHING = 1e-6  # barycentric: a point so little outside an element touches it
+TOUCHING = 1e-6  # barycentric: points this close outside an element touch it
 POINTS = 4  # quadrature points of an element, of the rule for degree 2
 LOCALITY = 1.0  # weight exp(-LOCALITY d^2) of a sample d elements from the point; 0.7 to 5 tried
 AT_ONCE = 100  # corner nodes whose elements are processed together

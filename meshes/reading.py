@@ -1,4 +1,4 @@
-"""Reading of users' files: regular files of limited size, whatever they contain."""
+"""Reading of users' files: regular files of limited size, with any content."""
 
 import codecs
 import json

@@ -219,9 +219,7 @@ def _offset(three: Floats) -> float:
 
 
 def _decays(x: Floats, turns: float) -> bool:
-    """Whether signals (t, p) are weaker in their second half, at a frequency in turns per
-    sample.
-    """
+    """Whether signals (t, p) are weaker in their second half, at a rate in turns per sample."""
     half = len(x) // 2
     wave = cosines("hann", half) * np.exp(-2j * np.pi * turns * np.arange(half))
     first, second = (np.linalg.norm(wave @ part) for part in (x[:half], x[-half:]))

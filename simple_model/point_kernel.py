@@ -29,7 +29,7 @@ def published_load(pressure: MovingPressure) -> MovingPressure:
 
 
 def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """Compute the stimulation under the published load, whatever the given drive law and focus.
+    """Compute the stimulation under the published load, for any given drive law and focus.
 
     Parameters, result and errors are those of `point_kernel`.
     """

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 PAGE_SECONDS = 0.030  # s of waveforms on a page, at their end
 # The side lobes of this Kaiser window are below -140 dB, so it resolves lines as weak as that.
-LINE_BETA, LINE_BINS = 19.0, 2.5  # for lines at least so many bins apart
+LINE_BETA, LINE_BINS = 19.0, 2.5  # for lines at least this many bins apart
 SETTLE = 0.25  # of a response, left out at its start when lines are fitted
 ALIKE = 1e-3  # of the frequency resolution: closer lines are one
 MINOR = 0.05  # of a line: most that unresolved neighbours may have together

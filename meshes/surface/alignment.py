@@ -18,7 +18,7 @@ ROTATIONS = {  # each about one axis; the rows are the new x, y and z
     "+x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
     "-x": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
 }
-INSIDE, LEVEL = 3e-3, 1e-4  # m: least distance of the origin from the outline, largest from the top
+INSIDE, LEVEL = 3e-3, 1e-4  # m: smallest distance from the outline, largest from the top
 OUTLINE_CELLS = 200  # along the longer side of the raster of the outline
 
 

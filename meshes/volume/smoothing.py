@@ -20,7 +20,7 @@ STEPS, SHARE = 12, 0.7  # steps, and the share of the way to the mean in each
 # Trial moves of a node of a sharp element: distances over the edges around it, and directions.
 TRIAL_STEPS = np.array([0.2, 0.1, 0.05, 0.025] * 2)
 DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
-GOOD = 25.0  # degrees: least angles below it may not shrink, and others not fall below it
+GOOD = 25.0  # degrees: smallest angles may neither decrease below it, nor fall below it
 
 
 def smooth(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:

@@ -32,8 +32,8 @@ MOST_TERMS = 16
 PER_DECADE = 40  # frequencies at which a law is evaluated
 BEYOND = (0.5, 1.0, 2.0, 4.0, 8.0)  # factors by which times extend beyond the ends of a band
 FAR_BELOW = 1e3  # times the slowest period over 2 pi: time of a term below the band
-NO_BETTER = 1.1  # times the least deviation, accepted for fewer terms if data are noisy
-LEAST_MODULUS = 1e-3  # of the first modulus: least modulus at rest of a law without one
+NO_BETTER = 1.1  # times the smallest deviation, accepted for fewer terms if data are noisy
+LEAST_MODULUS = 1e-3  # of the first modulus: lowest modulus at rest of a law without one
 LEAST_LOSS = -1e-9  # of the modulus: round-off of a law without loss
 # Measured moduli with random errors of 5 % in both parts are 7 % from every causal law; a
 # hysteretic loss factor of 0.2 is 10 % away, of 0.3 15 %. The limit applies to the root mean

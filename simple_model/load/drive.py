@@ -74,7 +74,7 @@ class DriveLaw:
         return np.asarray(self(level, one, depth) / self(1.0, one, depth))
 
     def is_product(self, amplitude: float, depth: float) -> bool:
-        """Whether the level of the amplitude multiplies the pressure, whatever the modulation."""
+        """Whether the level multiplies the pressure by the same factor for any modulation."""
         level, M = np.meshgrid(np.linspace(0, 1, 9), np.linspace(-1, 1, 9))
         both = self(amplitude * level, M, depth)
         factors = self.level_factor(level, depth) * self(amplitude * np.ones_like(M), M, depth)

@@ -297,9 +297,7 @@ def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
 
 
 def _apart(first: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
-    """Places, and those of the others that are more than a gap away from them and from both
-    ends.
-    """
+    """Places, and those of the others that are more than a gap away from these and both ends."""
     places = [-end, *first, end]
     for place in sorted(others, key=abs):
         if abs(place) < end and all(abs(place - each) > gap for each in places):

@@ -166,7 +166,7 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
         shapes = fem.probe_operator(sheet.made.mesh, probes) @ sheet.modes.basis
         normal_motion = _from_rest(motion, shapes, times, normal.reading.record, ())
         elements = _plate_error(normal, times, options, normal_motion, size)
-    # The steps of the linear part are corrected; those of the rest err in proportion to the rest.
+    # The linear part has no step error; that of stretching is proportional to stretching.
     share = np.minimum(relative_changes(values - linear, values), 1)
     error = elements + float((share * relative_changes(straight - linear, values)).max())
     effort = replace(

@@ -69,7 +69,7 @@ def played_text(view: View) -> str:
 
 
 def duration(frames: int) -> float:
-    """Return the duration in s of a film with so many frames."""
+    """Return the duration in s of a film with a number of frames."""
     return max(SHORTEST, SHORTEST_FRAME * frames)
 
 

@@ -151,7 +151,7 @@ def device_path(
     """Return the path of a device that moves its focus at an update rate in Hz.
 
     The focus rests on equally spaced points, by default as many as the device can set, rate / f_d.
-    Raises a ValueError if no device has this rate or so many points.
+    Raises a ValueError if no device has this rate or can set this number of points.
     """
     check_rate(update_rate)
     period = 1 / path.drawing_frequency

@@ -55,7 +55,7 @@ TINY = np.finfo(float).tiny
 FIRST = "as published"  # step of the model point-kernel-published
 LARGER = 1.25  # element size over the default one, at a third of the time
 # With a tenth of the damping a reduction may need more moments than allowed. Larger elements need
-# as many, and find out at a tenth of the cost.
+# as many, which shows this at a tenth of the cost.
 ALMOST_UNDAMPED, COARSER = "all but: little loss", 3.0
 LINE_COLUMNS = (
     "step", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_step_before_db",

@@ -245,6 +245,6 @@ def _variation(key: str, values: Values) -> Variation:
     if isinstance(values, str):
         return parse(f"{key}={values}")
     checked = parse(f"{key}=0")  # raises for an unknown key
-    # Numbers of numpy as a file has them.
+    # Convert numbers of numpy to those of a file.
     plain = (value.item() if hasattr(value, "item") else value for value in values)
     return Choice(key=checked.key, values=tuple(plain))

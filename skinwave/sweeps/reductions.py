@@ -27,7 +27,7 @@ from skinwave.scene.scene import Body, Load, Reading, Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.system.effort import Progress
 
-PER_WORKER = 3  # least bodies of a family: fewer are faster alone, one on each worker
+PER_WORKER = 3  # fewest bodies of a family: fewer are faster alone, one on each worker
 CACHED = 4  # bodies that a worker caches in memory, on two meshes each
 NEGLIGIBLE_LINE = 1e-2  # of the strongest line of a load: weaker ones need no finer mesh
 ROUND_OFF = 1e-9  # of a length
@@ -36,7 +36,7 @@ ROUND_OFF = 1e-9  # of a length
 Solid = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
 Values = tuple[tuple[str, float], ...]  # of free keys
 Families = list[tuple[Covering, dict[Solid, Values]]]  # each with the values of its bodies
-Limits = Mapping[str, tuple[float, float]]  # least and largest value by key
+Limits = Mapping[str, tuple[float, float]]  # lowest and highest value by key
 Distribute = Callable[[Callable[[Any], Any], Sequence[Any], Callable[[int, Any], None]], None]
 
 
