@@ -29,7 +29,8 @@ NODES = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])  #
 def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
     """Return the load operator P (3 n, k q): nodal forces in N for pressures in Pa.
 
-    Pressures are values at `facet_points` and act into the body, against the outward normal.
+    Pressures are values at `facet_points` and act into the body, against the outward normal. Raises
+    a MeshError for an unknown facet set.
 
     Examples
     --------

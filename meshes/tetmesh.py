@@ -194,7 +194,10 @@ def quadratic(mesh: TetMesh) -> TetMesh:
 
 
 def half(mesh: TetMesh, axis: str) -> TetMesh:
-    """Return the part of a mesh at positive x, y or z, with its cut in the facet set `mirror_x`."""
+    """Return the part of a mesh at positive x, y or z, with its cut in the facet set `mirror_x`.
+
+    Raises a MeshError if tetrahedra cross the cut, or none lies on this side.
+    """
     if axis not in ("x", "y", "z"):
         raise MeshError(f"axis '{axis}' is unknown; use x, y or z")
     coordinate = mesh.points[:, "xyz".index(axis)]

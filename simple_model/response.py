@@ -257,7 +257,8 @@ def windowed_amplitude(x: Floats, window: str) -> Floats:
 
 
 def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
-    """Compute line amplitudes (f, p) in the unit of the response: the moduli of `phasors`.
+    """Compute line amplitudes (f, p) in the unit of the response: the moduli of `phasors`, which
+    has the same arguments.
 
     >>> times = np.arange(1000) / 1e4
     >>> x = 1e-6 * np.sin(2 * np.pi * 140 * times)

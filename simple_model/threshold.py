@@ -36,8 +36,9 @@ MEASURED_FREQUENCY = 200.0  # Hz
 def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
     """Return the detection threshold (...) of displacement in m, peak, at frequencies (...) in Hz.
 
-    The area is "focal_spot", 0.58 cm2, or "large_contactor", 2.9 cm2, as in the measurements. The
-    result is NaN below 10 and above 1000 Hz, where the curve does not apply.
+    The area is "focal_spot", 0.58 cm2, or "large_contactor", 2.9 cm2, as in the measurements;
+    others raise a ValueError. The result is NaN below 10 and above 1000 Hz, where the curve does
+    not apply.
 
     >>> 1e6 * threshold([40.0, 200.0]).round(8)  # micrometre
     array([3.98, 0.35])

@@ -43,6 +43,8 @@ class Grading:
     radius : float, m, half width of the square of fine cells
     growth : float, size ratio of neighbouring cells outside the square and downwards
     coarsest : float, m, largest cell
+
+    Raises a MeshError if a value is out of range.
     """
 
     radius: float
@@ -133,7 +135,10 @@ def block(
 
 
 def middle_plane(mesh: TetMesh) -> Ints:
-    """Return the triangles (k, 6) in the middle plane of an extruded sheet, in order of its top."""
+    """Return the triangles (k, 6) in the middle plane of an extruded sheet, in order of its top.
+
+    Raises a MeshError if no nodes lie in this plane.
+    """
     top = facet_set(mesh, "top")
     low, high = mesh.points[:, 2].min(), mesh.points[:, 2].max()
     layer = np.flatnonzero(np.abs(mesh.points[:, 2] - (low + high) / 2) < 1e-9 * (high - low))

@@ -33,6 +33,8 @@ def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> Te
     Returns
     -------
     TetMesh
+
+    Raises a MeshError for four-node elements.
     """
     if mesh.order != 2:
         raise MeshError(

@@ -98,6 +98,8 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
     -------
     TetMesh with the regions `tissue` (0) and `bone` (1) and the facet sets `top` (faces upwards),
         `sides` (the cut) and `bottom`
+
+    Raises a MeshError if h is not finite and above 0.
     """
     if not 0 < h < np.inf:
         raise MeshError(f"h = {h} m must be finite and above 0")

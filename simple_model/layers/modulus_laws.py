@@ -39,6 +39,8 @@ class FractionalKelvinVoigt:
     exponent : float, n, above 0 and at most 1
     time : float, tau in s, 0 or above
 
+    Raises a ValueError if a value is out of range.
+
     >>> law = FractionalKelvinVoigt(shear_modulus=25e3, exponent=0.33, time=0.3e-3)
     >>> round(abs(law(2 * np.pi * 140.0)))  # Pa
     39799
@@ -78,6 +80,8 @@ class FractionalZener:
     shear_modulus : float, mu_0 in Pa, above 0, at rest
     fast_modulus : float, mu_inf in Pa, at least mu_0, in fast motion
     exponent, time : see `FractionalKelvinVoigt`
+
+    Raises a ValueError if a value is out of range.
     """
 
     shear_modulus: float

@@ -46,7 +46,7 @@ class Field:
     times : (t,) float, s
     displacement : (t, n, 3) float, m, of the nodes of `mesh`
     effort : Effort
-    expected_error : float, relative error of the waveforms at the probes, nan if unknown
+    expected_error : float, relative error of the waveforms at the probes; nan if unknown
 
     Examples
     --------
