@@ -40,7 +40,7 @@ def discretise(body: Body, h: float) -> Discretised:
     The support below represents bone; those at both ends represent the tissue that was cut off.
     """
     try:
-        mesh = mapped_palm(body.palm, *body_lines(body, h))
+        mesh = mapped_palm(body.palm, *grid_lines(body, h))
     except MeshError as error:
         raise MeshError(
             "this palm cannot be meshed, because its relief is too steep; reduce "
@@ -56,7 +56,7 @@ def _coarsest(body: Body, h: float) -> float:
     return max(SURFACE * h, min(COARSEST * h, RIM * body.palm.edge_radius))
 
 
-def body_lines(body: Body, h: float) -> Lines:
+def grid_lines(body: Body, h: float) -> Lines:
     """Return grid lines in m of the box around a palm, with cells that grow from its middle."""
     side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
     finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
@@ -85,7 +85,7 @@ PALM = register(
         presets={"palm": {"width": 0.085}},  # of the effective homogeneous soft tissue of a palm
         check=lambda body: body.palm,
         discretise=discretise,
-        grid_lines=body_lines,
+        grid_lines=grid_lines,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,
         named_sides=("front", "back"),

@@ -29,12 +29,12 @@ GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
 def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
     """Return a structured mesh in layers, with an absorbing layer `wider` times the usual width."""
-    return on_lines(body, body_lines(body, h), wider)
+    return on_lines(body, grid_lines(body, h), wider)
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
     """Return a function that meshes another slab by stretching the layers of the thickest one."""
-    x, y, z = body_lines(thickest, h)
+    x, y, z = grid_lines(thickest, h)
     depths = thickest.interfaces
     return lambda body, h: on_lines(body, (x, y, -np.interp(-z, depths, body.interfaces)))
 
@@ -53,16 +53,16 @@ def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
     )  # fmt: skip
 
 
-def body_lines(body: Body, h: float) -> Lines:
+def grid_lines(body: Body, h: float) -> Lines:
     """Return grid lines along x, y and z through a body, fine where the focus travels."""
     along = Grading(radius=FINE_RADIUS, growth=GROWTH[0], coarsest=COARSEST[0] * h)
     x, y = (mirror_line(graded_axis(side / 2, h, along)) for side in (body.width, body.height))
     return x, y, -_depth_line(body, h)[::-1]
 
 
-def slab_lines(body: Body, h: float) -> Lines:
+def slab_grid_lines(body: Body, h: float) -> Lines:
     """Return the grid lines of a body with those of any absorbing layer."""
-    return _extend(body, body_lines(body, h))
+    return _extend(body, grid_lines(body, h))
 
 
 def _extend(body: Body, lines: Lines, wider: float = 1.0) -> Lines:
@@ -128,8 +128,8 @@ SLAB = register(
         },
         discretise=discretise,
         morph=morph,
-        grid_lines=body_lines,
-        check_size=lambda body, h: check_size(len(line) - 1 for line in slab_lines(body, h)),
+        grid_lines=grid_lines,
+        check_size=lambda body, h: check_size(len(line) - 1 for line in slab_grid_lines(body, h)),
         default_size=lambda body: min(SLAB_CELL, body.depth / 2),
         compliance=lambda body: layered(stack(body)),
         dispersion=stack_dispersion,

@@ -9,7 +9,7 @@ import numpy as np
 
 from skinwave.live.packs import pack_of
 from skinwave.live.records import body_of, dispersion_of, record_of, with_changes
-from skinwave.live.values import values_of
+from skinwave.live.values import control_values
 from skinwave.scene.scene import BODIES
 from skinwave.system.effort import Progress, silent
 
@@ -52,7 +52,7 @@ def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict
         raise ValueError(f"{name or 'The file'} is not UTF-8 text. Give a scene file.") from None
     known = (name for name, body in BODIES.items() if body == scene.body)
     own = next(known, f"own-{scene.body.kind}")
-    values = values_of(scene, own)
+    values = control_values(scene, own)
     pack = pack_of(scene.body, progress)
     return {"values": values, "body": record_of(scene.body, pack, own, waves=False)}
 

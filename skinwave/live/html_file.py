@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from skinwave.live import values
-from skinwave.live.packs import method_of, pack_of
+from skinwave.live.packs import pack_method, pack_of
 from skinwave.live.records import record_of, title_of
 from skinwave.live.selftest import selftest
 from skinwave.scene.paper15 import tactons
@@ -56,7 +56,7 @@ def data_of(
     data of the self-test. Raises ValueError if no control of the page can set a scene.
     """
     names = unique_names([scene.body for scene in scenes] or [BODIES[name] for name in bodies])
-    own = [values.values_of(scene, names[scene.body]) for scene in scenes]
+    own = [values.control_values(scene, names[scene.body]) for scene in scenes]
     records, tests = [], []
     for body, name in names.items():
         prefix = f"{title_of(body)}: " if len(names) > 1 else ""
@@ -87,7 +87,7 @@ def comparison_page(scenes: Iterable[Scene]) -> str | None:
 
 def _is_quick(body: Body) -> bool:
     try:
-        return method_of(body) != "poles"
+        return pack_method(body) != "poles"
     except ValueError:
         return False
 

@@ -21,7 +21,7 @@ from skinwave.system.effort import Progress, silent, versions
 FORMAT = "live pack 4"  # of cached entries
 
 
-def method_of(body: Body) -> str:
+def pack_method(body: Body) -> str:
     """Return the method by which the page computes a body: "radial" for wavenumber integrals,
     "modal" for the modes of a sheet, or "poles" for a reduced finite-element model.
     """
@@ -46,7 +46,7 @@ def resting_scene(body: Body) -> Scene:
 
 def pack_of(body: Body, progress: Progress = silent) -> dict[str, Any]:
     """Return the pack of a body as a dict for JSON. Packs of finite-element bodies are cached."""
-    method = method_of(body)
+    method = pack_method(body)
     if method != "poles":
         return {"radial": radial_pack, "modal": sheet_pack}[method](body, progress)
     content = hashlib.sha256(Path(body.file).read_bytes()).hexdigest() if body.file else ""

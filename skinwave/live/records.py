@@ -11,7 +11,7 @@ import tomli_w
 
 from simple_model.layers.material import Material
 from skinwave.bodies.analytic import dispersion
-from skinwave.live.packs import method_of, resting_scene
+from skinwave.live.packs import pack_method, resting_scene
 from skinwave.scene.file import from_table, parse_toml, to_table
 from skinwave.scene.scene import BODIES, Body, Layer, body_name, solid_of
 
@@ -66,7 +66,7 @@ def record_of(
     """Return the record of a body as a dict for JSON, with its pack and, if `waves`, its dispersion
     curves. Name and title are those of the body by default.
     """
-    kind, infinite = body.of_kind, method_of(body) == "radial"
+    kind, infinite = body.of_kind, pack_method(body) == "radial"
     extent = [500 * body.width, 500 * body.height] if kind.is_bounded and not infinite else None
     return {
         "name": name or body_name(body), "title": title or title_of(body), "is_skin": body.is_skin,

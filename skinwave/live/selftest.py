@@ -8,9 +8,9 @@ import numpy as np
 from simple_model import SUPERPOSITIONS, MovingPressure, Tacton, Trajectory, even_phases
 from simple_model.layers.flat_body import steady_lines
 from skinwave.bodies.analytic import compliance
-from skinwave.live.packs import method_of
+from skinwave.live.packs import pack_method
 from skinwave.live.radial import LOWEST
-from skinwave.live.values import values_of
+from skinwave.live.values import control_values
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import answer, components, prepare
@@ -55,7 +55,7 @@ def selftest(
             continue
         lines = zip(f[compared].tolist(), amplitudes[compared].tolist(), strict=True)
         records.append({
-            "body": name, "values": values_of(scene, name), "error": error,
+            "body": name, "values": control_values(scene, name), "error": error,
             "lines": [{"f": at, "re": value.real, "im": value.imag} for at, value in lines],
         })  # fmt: skip
     return records
@@ -66,7 +66,7 @@ def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
     lines, frequencies (f,) in Hz and amplitudes (f,) in m, and for its motion (t,) from rest; and
     the places (p, 2) in m where they are valid, () for any.
     """
-    method = method_of(body)
+    method = pack_method(body)
     if method != "poles":
         model = "flat-body" if method == "radial" else FROM_REST.name
         lines_of = _lines_of_layers if method == "radial" else _lines_of_sheet

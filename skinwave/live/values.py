@@ -38,12 +38,12 @@ EXAMPLES = {
 
 def presets() -> list[dict[str, Any]]:
     """Return the paper's 15 Tactons and the examples as records of title and values."""
-    paper = {title_of(tacton): _tacton_values(tacton) for _, tacton in tactons()}
+    paper = {tacton_title(tacton): _tacton_values(tacton) for _, tacton in tactons()}
     examples = {title: PLAIN | values for title, values in EXAMPLES.items()}
     return [{"title": title, "values": own} for title, own in (paper | examples).items()]
 
 
-def title_of(tacton: Tacton) -> str:
+def tacton_title(tacton: Tacton) -> str:
     """Return a title such as "AM 140 Hz + circle 20 mm at 12 m/s"."""
     path, am = tacton.trajectory, tacton.am_frequency
     parts = [f"AM {am:g} Hz"] if am else []
@@ -53,7 +53,7 @@ def title_of(tacton: Tacton) -> str:
     return words[:1].upper() + words[1:]
 
 
-def values_of(scene: Scene, body: str) -> Values:
+def control_values(scene: Scene, body: str) -> Values:
     """Return the values of the controls for a scene at its first probe; `body` is the name of its
     body on the page. Raises ValueError if the scene has something that no control sets.
     """

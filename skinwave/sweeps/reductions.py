@@ -33,9 +33,9 @@ NEGLIGIBLE_LINE = 1e-2  # of the strongest line of a load: weaker ones need no f
 ROUND_OFF = 1e-9  # of a length
 
 # The subject of a reduction: a body, its probes, their reading, and its load.
-Solid = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
+Subject = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
 Values = tuple[tuple[str, float], ...]  # of free keys
-Families = list[tuple[Covering, dict[Solid, Values]]]  # each with the values of its bodies
+Families = list[tuple[Covering, dict[Subject, Values]]]  # each with the values of its bodies
 Limits = Mapping[str, tuple[float, float]]  # lowest and highest value by key
 Distribute = Callable[[Callable[[Any], Any], Sequence[Any], Callable[[int, Any], None]], None]
 
@@ -73,7 +73,7 @@ def model_of(scene: Scene, model: str) -> str:
     return FLAT_BODY.name if is_exact and takes(FLAT_BODY, scene) else default_model(scene)
 
 
-def solid_of_run(point: DesignPoint, options: SolveOptions) -> Solid | None:
+def subject_of_run(point: DesignPoint, options: SolveOptions) -> Subject | None:
     """Return what a run's reduction depends on; None if its model needs no reduction."""
     scene = point.scene
     if (
@@ -82,10 +82,10 @@ def solid_of_run(point: DesignPoint, options: SolveOptions) -> Solid | None:
         or not scene.body.of_kind.discretise
     ):
         return None
-    return solid_of(scene)
+    return subject_of(scene)
 
 
-def solid_of(scene: Scene) -> Solid:
+def subject_of(scene: Scene) -> Subject:
     """Return what the reduction of a scene's body depends on."""
     return scene.body, scene.probes, scene.reading, scene.load
 
@@ -96,16 +96,16 @@ def shared_meshes(
     count: int,
     distribute: Distribute,
     progress: Progress,
-) -> dict[Solid, Mesh]:
+) -> dict[Subject, Mesh]:
     """Reduce each body of the runs once, families of bodies together, and return their meshes.
 
     `distribute` calls a function of items on `count` workers.
     """
     progress("reduce bodies", 0.0)
-    hardest: dict[Solid, DesignPoint] = {}
+    hardest: dict[Subject, DesignPoint] = {}
     for point in sorted(runs, key=_highest_line, reverse=True):
-        if solid := solid_of_run(point, options):
-            hardest.setdefault(solid, point)
+        if subject := subject_of_run(point, options):
+            hardest.setdefault(subject, point)
 
     def meshes_of(work: Callable[..., Mesh], items: Sequence[Any]) -> list[Mesh]:
         made: dict[int, Mesh] = {}
@@ -120,12 +120,12 @@ def shared_meshes(
     together = families(hardest, options.tolerance, count)
     family_meshes = meshes_of(mesh_of_family, [family for family, _ in together])
     meshes = {
-        solid: replace(mesh, values=values)
+        subject: replace(mesh, values=values)
         for (_, members), mesh in zip(together, family_meshes, strict=True)
-        for solid, values in members.items()
+        for subject, values in members.items()
         if not mesh.error
     }
-    alone = {solid: point.scene for solid, point in hardest.items() if solid not in meshes}
+    alone = {subject: point.scene for subject, point in hardest.items() if subject not in meshes}
     own_meshes = meshes_of(mesh_of_body, list(alone.values()))
     return meshes | dict(zip(alone, own_meshes, strict=True))
 
@@ -159,9 +159,9 @@ def mesh_of_body(options: SolveOptions, scene: Scene) -> Mesh:
         pair = refine(scene, scene.body, options)
         return Mesh(h=pair.h, coarser=pair.compared)
     # Raises the error of the given size before that of the coarser mesh.
-    _reduce_twice(solid_of(scene), options, Mesh(h=options.h, coarser=options.h))
+    _reduce_twice(subject_of(scene), options, Mesh(h=options.h, coarser=options.h))
     mesh = Mesh(h=options.h, coarser=comparison_size(scene.body, options.h))
-    _reduce_twice(solid_of(scene), options, mesh)
+    _reduce_twice(subject_of(scene), options, mesh)
     return mesh
 
 
@@ -184,7 +184,7 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
     """
     if mesh.error:
         raise ValueError(mesh.error)
-    fine, coarse = _reduce_twice(solid_of(scene), options, mesh)
+    fine, coarse = _reduce_twice(subject_of(scene), options, mesh)
     how = SolveOptions(tolerance=options.tolerance, h=mesh.h, solver=options.solver)
     response = assess(
         scene, answer(fine, scene), fine, how, compared=(mesh.coarser, coarse), meshed=mesh.meshed
@@ -195,44 +195,47 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
     return response, mesh
 
 
-def _reduce_twice(solid: Solid, options: SolveOptions, mesh: Mesh) -> list[ReducedBody]:
+def _reduce_twice(subject: Subject, options: SolveOptions, mesh: Mesh) -> list[ReducedBody]:
     """Return the reduced body on both meshes."""
     return [
-        prepare_body(solid, h, options.tolerance, options.solver, mesh.family, mesh.values)
+        prepare_body(subject, h, options.tolerance, options.solver, mesh.family, mesh.values)
         for h in (mesh.h, mesh.coarser)
     ]
 
 
 @lru_cache(maxsize=2 * CACHED)
 def prepare_body(
-    solid: Solid, h: float, tolerance: float, solver: str, family: Covering | None, values: Values
-) -> ReducedBody:
+    subject: Subject, h: float, tolerance: float, solver: str,
+    family: Covering | None, values: Values,
+) -> ReducedBody:  # fmt: skip
     """Return a reduced body with elements of h in m; in a family, the one with these values."""
     if family:
         return parametric.at(cached_shared_body(family, h, tolerance, solver), dict(values))
-    body, probes, reading, load = solid
+    body, probes, reading, load = subject
     return prepare(
         body, np.array(probes), h=h, solver=solver, tolerance=reduction_tolerance(tolerance),
         reading=reading, load=load,
     )  # fmt: skip
 
 
-def families(hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int = 1) -> Families:
+def families(
+    hardest: Mapping[Subject, DesignPoint], tolerance: float, workers: int = 1
+) -> Families:
     """Group bodies into families, given the run with the highest line of each body.
 
     A family has many thicknesses if this saves time, otherwise one.
     """
     found: Families = []
     for moving in (True, False):
-        shared = {solid for _, members in found for solid in members}
-        remaining = {solid: point for solid, point in hardest.items() if solid not in shared}
+        shared = {subject for _, members in found for subject in members}
+        remaining = {subject: point for subject, point in hardest.items() if subject not in shared}
         limits = _limits(remaining.values())
-        groups: dict[tuple[Any, ...], dict[Solid, DesignPoint]] = {}
-        for solid, point in remaining.items():
-            if keys := _free_keys_of(solid[0], point, limits, moving=moving):
+        groups: dict[tuple[Any, ...], dict[Subject, DesignPoint]] = {}
+        for subject, point in remaining.items():
+            if keys := _free_keys_of(subject[0], point, limits, moving=moving):
                 assert point.before
                 rest = with_values(point.before.body, keys, {key.key: key.low for key in keys})
-                groups.setdefault((keys, rest, *solid[1:]), {})[solid] = point
+                groups.setdefault((keys, rest, *subject[1:]), {})[subject] = point
         for (keys, *_), members in groups.items():
             if len(members) >= PER_WORKER * workers:
                 found += _family(members, keys, tolerance)
@@ -277,7 +280,7 @@ def _free_keys_of(
 
 
 def _family(
-    members: Mapping[Solid, DesignPoint], keys: Sequence[FreeKey], tolerance: float
+    members: Mapping[Subject, DesignPoint], keys: Sequence[FreeKey], tolerance: float
 ) -> Families:
     """Return the family of bodies that differ in keys, if they can be reduced together."""
     limits = _limits(members.values())
@@ -289,7 +292,7 @@ def _family(
         return []
     free = {key.key: limits[key.key] for key in keys}
     family = covering(hardest.before, free, len(members), tolerance, hardest.scene.body)
-    values = {solid: _values(point, keys) for solid, point in members.items()}
+    values = {subject: _values(point, keys) for subject, point in members.items()}
     return [(family, values)] if family else []
 
 

@@ -21,12 +21,12 @@ from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import input_columns, result_columns
 from skinwave.sweeps.reductions import (
     Mesh,
-    Solid,
+    Subject,
     error_text,
     model_of,
     on_mesh,
     shared_meshes,
-    solid_of_run,
+    subject_of_run,
 )
 from skinwave.system.effort import Progress, silent
 
@@ -143,12 +143,12 @@ class Sweep:
         )  # fmt: skip
 
     def _batches(
-        self, runs: Mapping[str, DesignPoint], meshes: Mapping[Solid, Mesh], count: int
+        self, runs: Mapping[str, DesignPoint], meshes: Mapping[Subject, Mesh], count: int
     ) -> list[tuple[dict[str, DesignPoint], Mesh | None]]:
         """Group runs on the same body, and short runs."""
-        groups: dict[Solid | None, list[str]] = {}
+        groups: dict[Subject | None, list[str]] = {}
         for name, point in runs.items():
-            groups.setdefault(solid_of_run(point, self.options), []).append(name)
+            groups.setdefault(subject_of_run(point, self.options), []).append(name)
         # Several batches for each worker, so that none waits long for the last.
         size = max(1, min(BATCH, len(runs) // (4 * count)))
         return [

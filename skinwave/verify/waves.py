@@ -10,7 +10,7 @@ import fem
 import meshes
 from meshes import TetMesh
 from skinwave.bodies.absorbing_layer import layer_drag, layer_of
-from skinwave.bodies.slab import slab_lines
+from skinwave.bodies.slab import slab_grid_lines
 from skinwave.scene.scene import Body
 from skinwave.typing import Array
 from skinwave.verify import references
@@ -170,7 +170,7 @@ def absorbing_layer() -> Checks:
 
 def _plane_slab(body: Body, hertz: Array, h: float = 2.5e-3) -> Array:
     """Return displacements (f, p) in m under a line focus, in the half x > 0 of a slab."""
-    x, _, z = slab_lines(body, h)
+    x, _, z = slab_grid_lines(body, h)
     mesh = meshes.half(meshes.extrude(x, [0, h], z), "x")
     ops = fem.assemble(
         mesh, body.solid, fixed={"bottom": "xyz", "mirror_x": "x", "front": "y", "back": "y"},

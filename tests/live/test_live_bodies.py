@@ -12,7 +12,7 @@ from skinwave.live.elements import BAND, element_pack
 from skinwave.live.packs import pack_of
 from skinwave.live.records import record_of
 from skinwave.live.selftest import HIGHEST, SMALLEST, exact, random_scene
-from skinwave.live.values import values_of
+from skinwave.live.values import control_values
 from skinwave.scene.scene import BODIES
 
 pytestmark = needs_browser
@@ -46,7 +46,7 @@ def scenes(name, count, places=(), **tacton):
 
 
 def answer(page, name, scene):
-    return page.evaluate(ANSWER, {"name": name, "values": values_of(scene, name)})
+    return page.evaluate(ANSWER, {"name": name, "values": control_values(scene, name)})
 
 
 def line_errors(page, name, made, lines_of, smallest=SMALLEST, highest=HIGHEST):
@@ -78,7 +78,7 @@ def test_lines_waveforms_and_maps_of_layers_and_sheets(page, name):
     rhythm = Rhythm(pulses=((0.03, 0.02), (0.02, 0.01)), ramp=0.01)
     pulsed = scenes(name, 1, rhythm=rhythm, duration=0.1)
     assert wave_errors(page, name, pulsed, waveform_of).max() < 0.02
-    given = {"name": name, "values": values_of(made[0], name), "k": 45 * 19 + 28}
+    given = {"name": name, "values": control_values(made[0], name), "k": 45 * 19 + 28}
     pairs = np.array(page.evaluate(PLACES, given))
     assert np.abs(pairs[:, 0] - pairs[:, 1]).max() < 5e-3 * np.abs(pairs).max()
 

@@ -14,7 +14,7 @@ from simple_model.load.line_names import line_names
 from simple_model.load.path_cells import is_abrupt
 from simple_model.load.spectrum import pressure_lines
 from simple_model.threshold import pressure_threshold
-from skinwave.live.values import presets, values_of
+from skinwave.live.values import control_values, presets
 from skinwave.results.comparison import phase_delays
 from skinwave.results.propagation import distance_from_path, reach_of, share_outside
 
@@ -35,7 +35,7 @@ def test_scene_files_and_addresses_preserve_values(page, starts):
     addressed = "(many) => many.map((own) => fromAddress(`#${toAddress(own)}`))"
     assert page.evaluate(addressed, many) == [{"values": own, "refused": []} for own in many]
     for scene, own in zip(scenes_of(page, many), many, strict=True):
-        back = values_of(scene, "none")
+        back = control_values(scene, "none")
         same = {"amplitude", "am", "am2", "ratio", "envelope", "duration", "height", "drive", "x",
                 "y", "peak", "modulation", "profile", "foci", "sharing", "quantity"}  # fmt: skip
         assert {key: back[key] for key in same} == pytest.approx({key: own[key] for key in same})

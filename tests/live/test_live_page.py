@@ -10,7 +10,7 @@ from in_browser import frames, needs_browser
 from skinwave.commands.cli import main
 from skinwave.live.html_file import json_for_script, page, policy
 from skinwave.live.records import body_of, editables, record_of, toml_of, with_changes
-from skinwave.live.values import presets, values_of
+from skinwave.live.values import control_values, presets
 from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES
 
@@ -57,11 +57,11 @@ def test_values_of_scenes():
     assert len(titles) == 15 + 4
     assert {"AM 140 Hz", "Circle 10 mm at 6 m/s", "AM 140 Hz + circle 20 mm at 12 m/s"} <= {*titles}
     for tacton, expected in SET.items():
-        found = values_of(loads(SCENE.replace("[body]", f"{tacton}\n[body]")), "skin-slab")
+        found = control_values(loads(SCENE.replace("[body]", f"{tacton}\n[body]")), "skin-slab")
         assert expected.items() <= found.items()
     for more in ("depth_mm = 1", 'quantity = "strain_zz"', '[load]\nkind = "shear"'):
         with pytest.raises(ValueError, match="no control|pressure"):
-            values_of(loads(SCENE + more), "skin-slab")
+            control_values(loads(SCENE + more), "skin-slab")
 
 
 @pytest.mark.parametrize("name", ["palm-layers", "paper-sheet"])

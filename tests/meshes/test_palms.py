@@ -106,7 +106,7 @@ def test_a_relief_that_a_grid_cannot_follow_is_refused():
 def test_the_default_relief_fits_small_palms():
     width, height, depth = 0.03, 0.12, 0.008
     body = Body(kind="palm", width=width, height=height, depth=depth)
-    mesh = mapped_palm(body.palm, *body_palm.body_lines(body, min(depth / 2, 8e-3)))
+    mesh = mapped_palm(body.palm, *body_palm.grid_lines(body, min(depth / 2, 8e-3)))
     box = width * height * depth
     filled = corner_volumes(mesh.points, mesh.tets).sum()
     assert 0.5 * box < filled < box * (1 + body.palm.thenar_height / depth)

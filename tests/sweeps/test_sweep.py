@@ -139,7 +139,7 @@ def families_of(body, *varied, design="factorial"):
     """How many bodies of a sweep share a model, each of which has its own materials."""
     table = to_table(Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=body))
     points = cases_of(table, table, combinations([parse(each) for each in varied], design))
-    hardest = {reductions.solid_of(point.scene): point for point in points}
+    hardest = {reductions.subject_of(point.scene): point for point in points}
     found = reductions.families(hardest, 0.05)
     for family, members in found:
         keys = free_keys(family.scene.body, {k: (a, b) for k, a, b in family.ranges})
