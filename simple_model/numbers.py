@@ -67,6 +67,15 @@ def percent(share: float) -> str:
     return f"{significant(100 * share, 2)} %"
 
 
+def share_of(ratio: float, whole: str) -> str:
+    """Format a ratio to a whole in percent, or as a factor if it is above 100 %.
+
+    >>> share_of(0.314, "the motion"), share_of(2.05, "the motion")
+    ('31 % of the motion', '2.0 times the motion')
+    """
+    return f"{significant(ratio, 2)} times {whole}" if ratio > 1 else f"{percent(ratio)} of {whole}"
+
+
 def plural(number: int, thing: str) -> str:
     """Format a number of things.
 

@@ -326,7 +326,7 @@ class BodyKind:
 
 def _size(body: Body) -> str:
     across = f"{1e3 * body.width:g} x {1e3 * body.height:g}"
-    deep = f" x {1e3 * body.depth:g}" if isfinite(body.depth) else ""
+    deep = f" x {1e3 * body.depth:.3g}" if isfinite(body.depth) else ""
     return f"{body.kind} of {across}{deep} mm"
 
 

@@ -46,7 +46,7 @@ MESH = register(
     BodyKind(
         name="mesh",
         keys=("file", "unit", "up", "regions"),
-        words=lambda body: f"body from {Path(body.file).name}, {body.up} towards the device",
+        words=lambda body: f"mesh from {Path(body.file).name}, {body.up} towards the device",
         discretise=discretise,
         default_size=hand_size,
         is_bounded=False,

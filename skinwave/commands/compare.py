@@ -59,6 +59,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene import paper15
     from skinwave.scene.file import read
     from skinwave.scene.scene import with_body
+    from skinwave.studies.first_screen import first_name
     from skinwave.studies.study import own_scenes, paper_scenes, run_study
     from skinwave.system import document
 
@@ -78,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         out = f"{Path(options.scene).stem}-compared"
         inputs += [options.scene, given.body.file, options.measured or ""]
     with result_folder(options, out, inputs, given) as (folder, progress):
-        live = comparison_page(next(iter(scenes.values())).values())
+        live = comparison_page(scenes[first_name(scenes)].values())
         if live:
             (folder / LIVE).write_text(live, encoding="utf-8")
         outcome = run_study(

@@ -4,14 +4,18 @@ import hashlib
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from skinwave.live import values
 from skinwave.live.packs import pack_method, pack_of
 from skinwave.live.records import record_of, title_of
 from skinwave.live.selftest import selftest
+from skinwave.results.propagation import distance_from_path
 from skinwave.scene.paper15 import tactons
 from skinwave.scene.scene import BODIES, Body, Scene, body_name
 from skinwave.system.effort import Progress, silent
@@ -52,9 +56,14 @@ def data_of(
     bodies: Sequence[str] = DEFAULT_BODIES,
     test: bool = True,
 ) -> dict[str, Any]:
-    """Return the data of a page of scenes, or of preset bodies, as a dict for JSON. `test` adds the
-    data of the self-test. Raises ValueError if no control of the page can set a scene.
+    """Return the data of a page of scenes at their probes nearest to the path, or of preset bodies,
+    as a dict for JSON. `test` adds the data of the self-test. Raises ValueError if no control of
+    the page can set a scene.
     """
+    scenes = [
+        replace(scene, probes=tuple(sorted(scene.probes, key=partial(_distance, scene))))
+        for scene in scenes
+    ]
     names = unique_names([scene.body for scene in scenes] or [BODIES[name] for name in bodies])
     own = [values.control_values(scene, names[scene.body]) for scene in scenes]
     records, tests = [], []
@@ -77,17 +86,23 @@ def data_of(
 
 
 def comparison_page(scenes: Iterable[Scene]) -> str | None:
-    """Return the page of the scenes with quick packs; None if there are none or it fails."""
-    quick = [scene for scene in scenes if _is_quick(scene.body)]
+    """Return the page of the scenes with quick packs, skin first; None if there are none or it
+    fails.
+    """
+    quick = sorted(filter(_is_quick, scenes), key=lambda scene: not scene.body.is_skin)
     try:
         return page(data_of(quick, test=False)) if quick else None
     except (ValueError, ArithmeticError):
         return None
 
 
-def _is_quick(body: Body) -> bool:
+def _distance(scene: Scene, probe: tuple[float, float]) -> float:
+    return float(distance_from_path(scene, np.array(probe)))
+
+
+def _is_quick(scene: Scene) -> bool:
     try:
-        return pack_method(body) != "poles"
+        return pack_method(scene.body) != "poles"
     except ValueError:
         return False
 

@@ -12,6 +12,7 @@ from simple_model.numbers import (
     as_sentence,
     percent,
     plural,
+    share_of,
     significant,
     stated_error,
     with_error,
@@ -172,7 +173,7 @@ def conclusion(comparison: MeasuredComparison, column: ModelColumn) -> str:
     """Return whether, and where, a model agrees with the data."""
     name, differs, lines = label(column.run.column), column.differs, comparison.lines
     known = int(np.isfinite(column.p_values).sum())
-    misfit = f"The misfit is {percent(column.misfit)} of the measured lines"
+    misfit = f"The misfit is {share_of(column.misfit, 'the measured lines')}"
     if not known:
         return (
             f"The noise of the data is unknown, so the agreement of the {name} cannot be tested. "

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simple_model.numbers import percent, plural, significant
+from simple_model.numbers import percent, plural, share_of, significant
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.fit import Fit
 from skinwave.measure.inspection import flaws
@@ -13,6 +13,7 @@ from skinwave.measure.observed import first_names
 from skinwave.measure.parameters import DELAY
 
 MISFIT = 1.5  # chi squared over its degrees of freedom, for known errors
+POOR = 0.3  # residual over the measured motion
 LEAST_SHARE = 1e-3  # of the measured power in lines that are not fitted
 LEAST_PROBABILITY = 1e-9  # that is shown
 CORRELATED = 0.1  # smallest correlation that is mentioned
@@ -26,8 +27,8 @@ def sentences(result: Fit) -> list[str]:
     return [
         f"{result.target.model} was fitted to {data.words}.",
         f"{solution.agreeing_starts} of {plural(len(solution.starts), 'start')} reached the "
-        f"solution. Its residual is {percent(result.misfit)} of the measured motion"
-        f"{known * data.is_known}.",
+        "solution.",
+        f"The residual is {share_of(result.misfit, 'the measured motion')}{known * data.is_known}.",
         *(
             "{} = {}, 95 % interval {} to {}.".format(each.key, *round_to_interval(each))
             for each in result.estimates
@@ -57,6 +58,11 @@ def _of_solution(result: Fit) -> Iterator[str]:
     count = len(solution.starts)
     missed = count - solution.agreeing_starts
     strong = [line for line in solution.problem.data.left_out if line.share > 0]
+    if result.misfit > POOR and not (solution.problem.data.is_known and solution.scale < MISFIT):
+        yield (
+            f"poor fit: {share_of(result.misfit, 'the measured motion')} is unexplained; check the "
+            "model and the scene"
+        )
     if solution.may_be_flipped:
         yield opposite_sign(result.target.model, DELAY in solution.problem.parameters.keys)
     if not solution.converged:

@@ -1,6 +1,7 @@
 """Page, figures, tables and files of a fit."""
 
 import json
+import re
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,22 @@ from simple_model import Effort
 from simple_model.numbers import significant
 from skinwave.measure.findings import cautions, notes, probability, round_to_interval, sentences
 from skinwave.measure.fit import Fit
+from skinwave.measure.intervals import Estimate
 from skinwave.measure.measurement import strongest
 from skinwave.report.figures import REPORT, png
 from skinwave.report.palette import BLUE, ORANGE
 from skinwave.report.spectra import lines_figure
 from skinwave.scene.file import dumps
-from skinwave.system.document import Details, Part, Picture, Report, Section, preformat
+from skinwave.sweeps.table_figures import axis_label
+from skinwave.system.document import (
+    Details,
+    Part,
+    Picture,
+    Report,
+    Section,
+    contents,
+    preformat,
+)
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
@@ -59,9 +70,10 @@ def write(folder: Path, result: Fit) -> None:
     )  # fmt: skip
     about = ABOUT_RESIDUALS + ABOUT_LAGS * bool(len(result.intervals.whiteness.correlations))
     caption = ABOUT_WAVEFORMS if data.is_in_time else ABOUT_LINES
-    method, estimates = sentences(result)[:2], sentences(result)[2:]
+    model, starts, residual, *_ = sentences(result)
+    estimates = [_estimate_text(e) for e in result.estimates if e.is_resolved and not e.at_limit]
     parts: list[Part] = [
-        _interval_table(result), ABOUT_INTERVALS,
+        _interval_table(result), f"{model} {starts} {ABOUT_INTERVALS}",
         Picture(png(fitted_figure(result)), caption, "fitted"),
         Section("Residuals", [
             _whiteness(result), Picture(png(residual_figure(result)), about, "residuals"),
@@ -74,7 +86,7 @@ def write(folder: Path, result: Fit) -> None:
     parts.append(Details("The scene with the estimates", [preformat(text)]))
     Report(
         f"{result.target.scene.name} fitted to {result.measured.name or 'a measurement'}",
-        verdict=[" ".join(text) for text in (estimates, method) if text], parts=parts,
+        verdict=[" ".join([*estimates, residual])], parts=[*parts[:1], contents(parts), *parts[1:]],
         efforts=[("", Effort(warnings=tuple(cautions(result))))],
     ).write(folder)  # fmt: skip
 
@@ -84,14 +96,21 @@ def fitted_scene(result: Fit) -> str:
     return "".join(["# fitted\n", *(f"# {note}\n" for note in notes(result)), dumps(result.scene)])
 
 
+def _estimate_text(each: Estimate) -> str:
+    name, _, unit = re.sub("[${}]", "", axis_label(each.key).replace(".", " ")).partition(", ")
+    value, low, high = round_to_interval(each)
+    unit = f" {unit}" * bool(unit)
+    return f"{name.capitalize()} {value}{unit} (95 % interval {low} to {high}{unit})."
+
+
 def _whiteness(result: Fit) -> str:
     test = result.intervals.whiteness
     if not isfinite(test.p):
         return "The data are too few for a test of whiteness."
-    text = f"Test of Ljung and Box: p {probability(test.p)}"
+    text = f"Ljung-Box test: p {probability(test.p)}"
     if test.is_white:
-        return f"{text}; the residuals may be white."
-    return f"{text}; the residuals are not white, and the intervals are widened (White 1980)."
+        return f"{text}. The residuals may be white noise."
+    return f"{text}. The residuals are not white, so the intervals are widened (White 1980)."
 
 
 def estimate_table(result: Fit) -> Table:
@@ -176,7 +195,7 @@ def _waveforms(result: Fit) -> Figure:
     n = int(np.searchsorted(data.axis, data.axis[0] + DRAWN_TIME)) + 1
     part = slice(max(len(data.axis) - n, 0), None) if data.lines else slice(n)
     t = 1e3 * data.axis[part]
-    figure = Figure(figsize=REPORT.size(10.5, 1.9 * len(places) + 0.9), layout="constrained")
+    figure = Figure(figsize=REPORT.size(10.5, 1.5 * len(places) + 0.9), layout="constrained")
     axes = figure.subplots(len(places), 1, sharex=True, squeeze=False)[:, 0]
     for ax, p in zip(axes, places.tolist(), strict=True):
         for values, name, colour, width in (

@@ -93,7 +93,7 @@ def sentences(inspection: Inspection) -> list[str]:
         low, high = (record.per_unit * float(x) for x in (noise.min(), noise.max()))
         level = interval(low, high) if high > low else significant(low)
         unit = record.shown + "/√Hz" * (not measured.is_spectrum)
-        lines[1] = f"Noise floor {level} {unit}, median over frequency without the lines."
+        lines[1] = f"The noise floor is {level} {unit} (median over frequency, without lines)."
     if len(where):
         count = int(inspection.clipped.sum())
         lines.append(f"Clipped: {count:,} samples at an extreme, at {measured.place_names(where)}.")
@@ -114,8 +114,8 @@ def _content(inspection: Inspection) -> str:
         return f"{content}."
     duration = len(axis) / measured.rate
     return (
-        f"{content} at {measured.rate:,.6g} Hz, {significant(duration)} s; lines "
-        f"{significant(1 / (1 - SETTLE) / duration)} Hz apart are resolved."
+        f"{content} at {measured.rate:,.6g} Hz, {significant(duration)} s. Lines "
+        f"at least {significant(1 / (1 - SETTLE) / duration)} Hz apart are resolved."
     )
 
 

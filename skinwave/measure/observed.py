@@ -172,11 +172,12 @@ def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
     amplitudes = lines.measured
     a, f, correlation = amplitudes.mean, amplitudes.frequencies, amplitudes.correlation
     predict, runs = predicted_lines(aim, f), len(amplitudes.each)
-    noise = f"errors from {runs} repetitions" if runs > 1 else "errors from the noise floor"
+    known = f"{runs} repetitions" if runs > 1 else "the noise floor"
+    noise = f"with errors from {known}"
     if not lines.is_known:
-        noise = "equal errors, as there is one repetition"
+        noise = "with equal errors, as there is one repetition"
     data = Data(
-        kind=kind, words=f"complex amplitudes of {lines.words}, {noise}", axis=f,
+        kind=kind, words=f"complex amplitudes of {lines.words} {noise}", axis=f,
         values=_parts(a), error=np.tile(lines.error, 2), is_known=lines.is_known,
         predict=lambda values: _parts(predict(values)), lines=lines.names, left_out=lines.left_out,
         whitening=None if correlation is None else _whitening(correlation[None]),
@@ -185,7 +186,7 @@ def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
         return data
     floor = lines.error**2 if lines.is_known else 0.0
     return replace(
-        data, words=f"amplitudes of {lines.words}, {noise}", values=np.abs(a), error=lines.error,
+        data, words=f"amplitudes of {lines.words} {noise}", values=np.abs(a), error=lines.error,
         predict=lambda values: np.sqrt(np.abs(predict(values)) ** 2 + floor),
         whitening=None if correlation is None else _whitening(_of_moduli(correlation, a)),
     )  # fmt: skip
@@ -266,13 +267,13 @@ def _in_time(
 ) -> Data:
     """Return data of waveforms (t, p), with the noise (p,) of each place for one repetition."""
     r = len(measured.values)
-    error, source = noise, "errors in proportion to the noise at each place"
+    error, source = noise, "with errors in proportion to the noise at each place"
     if r > 1:
         error = np.sqrt(measured.values.var(axis=0, ddof=1).mean(axis=0) / r)
-        source = f"errors from {r} repetitions"
+        source = f"with errors from {r} repetitions"
     each = np.broadcast_to(_positive(error, measured.values), values.shape)
     return Data(
-        kind="waveforms", words=f"{words}, {source}", axis=measured.times, values=values,
+        kind="waveforms", words=f"{words} {source}", axis=measured.times, values=values,
         error=each, is_known=r > 1, predict=predict, rough=rough,
     )  # fmt: skip
 

@@ -32,8 +32,8 @@ SAME_LOAD = register(
         name="point-kernel",
         label="kernel, same load",
         method="point kernel",
-        words="the moving pressure, weighted by the distance to the focus; nothing propagates, and "
-        "the result is a stimulation in Pa",
+        words="the pressure weighted by the distance to the moving focus, in Pa; nothing "
+        "propagates",
         solve=_same_load,
         error=lambda scene, h: ERROR,
         colour="#000000",
@@ -47,8 +47,8 @@ PUBLISHED = register(
         SAME_LOAD,
         name="point-kernel-published",
         label="kernel, as published",
-        words="the same under the load of Lim, Seifi and Park: the commanded signal itself, "
-        "without a mean",
+        words="the point kernel under the load of Lim, Seifi and Park: the commanded signal "
+        "itself, without a mean",
         solve=_solve_published,
         colour="#999999",
     )

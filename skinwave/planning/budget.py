@@ -17,12 +17,12 @@ import numpy as np
 
 from simple_model.layers.compliance import layered
 from simple_model.layers.flat_body import steady_lines
-from simple_model.numbers import percent, significant, stated_error
+from simple_model.numbers import significant, stated_error
 from skinwave.bodies.analytic import flat_layers
 from skinwave.models.limits import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
-from skinwave.models.relative_change import relative_changes
+from skinwave.models.relative_change import change_text, relative_changes
 from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import CONTROLLER, element_sizes
 from skinwave.scene.distributions import Spread
@@ -52,8 +52,8 @@ class ErrorBudget:
     def words(self) -> str:
         """All three errors in one sentence."""
         return (
-            f"Error of the worst probe's waveform: numerical {stated_error(self.numerical)}; one "
-            f"standard deviation of the {self.spreads}"
+            f"Uncertainty of the waveform at the worst probe (standard deviation): {self.spreads}; "
+            f"numerical error {stated_error(self.numerical)}"
         )
 
     @property
@@ -73,7 +73,7 @@ class ErrorBudget:
 
 
 def _percent(value: float) -> str:
-    return percent(value) if isfinite(value) else "not computed"
+    return change_text(value) if isfinite(value) else "not computed"
 
 
 def error_budget(scene: Scene, numerical: float = nan) -> ErrorBudget:

@@ -62,7 +62,7 @@ def _model_text(runs: list[Run]) -> str:
         return text
     material, size = f"{material_text(body.solid)}{layers_text(body)}", size_text(body)
     infinite = " (taken as laterally infinite)" * model.is_infinite
-    text += f" Body: {size}{infinite}, of {material}."
+    text += f" The body is a {size}{infinite}; {material}."
     if body.of_kind.is_plate:
         return f"{text} {_sheet_text(runs)}"
     left_out = ["layers"] * (len(body.strata) == 1) + ["curvature"] * body.of_kind.is_layer
@@ -111,7 +111,7 @@ def path_text(tacton: Tacton) -> str:
         size = 1e3 * (path.size or path.length)
         text = f"{path.shape} of {size:g} mm{' per period' * (not path.size)} at {path.speed:g} m/s"
         text += f", {path.sweep.replace('_', ' ')}" * (path.sweep != "there_and_back")
-        text += f", f_d = {path.drawing_frequency:.3f} Hz"
+        text += f", f_d = {path.drawing_frequency:.1f} Hz"
     if any(path.centre):
         text += " about ({:g}, {:g}) mm".format(*(1e3 * x for x in path.centre))
     if len(tacton.foci) > 1:
@@ -184,9 +184,10 @@ def material_text(solid: Material | str) -> str:
         )
     if solid.law is not None:
         return text + getattr(solid.law, "words", "custom complex modulus")
-    text += f"viscosity {solid.viscosity:g} Pa s"
-    if solid.loss_factor:
-        text += f", loss factor {solid.loss_factor:g}"
+    losses = [f"viscosity {solid.viscosity:g} Pa s"] * bool(
+        solid.viscosity or not solid.loss_factor
+    )
+    text += ", ".join([*losses, *[f"loss factor {solid.loss_factor:g}"] * bool(solid.loss_factor)])
     for term in solid.prony:
         text += f", Maxwell branch of {term.modulus / 1e3:.4g} kPa with relaxation time "
         text += f"{1e3 * term.time:g} ms"

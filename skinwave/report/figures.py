@@ -80,11 +80,12 @@ def legend(
     By default it is below the figure, in one row, or in one column if the figure is narrow.
     """
     handles = [Line2D([], [], **entry) for entry in entries.values()]
+    names = [re.sub(r"(?<![\w$])-(?=\d)", "\u2212", name) for name in entries]
     columns = columns or (1 if figure.get_figwidth() < NARROW else max(len(entries), 1))
     usual: dict[str, Any] = {"loc": "outside lower center", "fontsize": small(), "frameon": False}
     if "loc" not in options:
         usual |= {"handlelength": 1.5, "columnspacing": 1.2}
-    figure.legend(handles, list(entries), ncols=columns, **(usual | options))
+    figure.legend(handles, names, ncols=columns, **(usual | options))
     return -(-len(entries) // columns)
 
 

@@ -18,6 +18,7 @@ COLOURS = {
     "skin-slab": BLUE,
     "measured": "#CC79A7",
 }
+DASHES: dict[str, Any] = {"paper-sheet": (0, (5, 1))}  # of waveforms, for print in grey
 MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
 LABELS = {
     **{model.name: model.label for model in (SAME_LOAD, PUBLISHED)},
@@ -47,6 +48,11 @@ def marker(column: str) -> str:
 def line_style(column: str) -> dict[str, Any]:
     """Return colour and marker of a `Run.column` as properties of a line."""
     return {"color": ink_colour(column), "marker": marker(column)}
+
+
+def dashes(column: str) -> Any:
+    """Return the dashes of the waveform of a `Run.column`."""
+    return DASHES.get(column, "solid")
 
 
 def label(column: str) -> str:

@@ -10,6 +10,7 @@ from math import floor, log10
 from typing import Any
 
 import numpy as np
+from matplotlib.font_manager import findfont
 from numpy.typing import NDArray
 
 from meshes.tetmesh import boundary_facets
@@ -30,6 +31,7 @@ CAMERAS = {
 }
 LARGEST_DRAWN = 0.06  # of the body's width, for the largest motion
 BAR = 10.0  # mm, length of the scale bar
+FONT, VTK_FONT_FILE = findfont("DejaVu Sans"), 4  # the font of all figures; the kind of font
 COLUMN = 0.26  # width of the colour bar over the height of the picture
 WIDTH = 1600  # pixels, of a picture at least
 LIFT = 0.4  # mm, of path, probes and focus above the surface
@@ -119,19 +121,24 @@ def stage(
                 plotter.add_mesh(_line(rim, cut=False), color="#9a9a9a", line_width=1)
             _set_camera(plotter, camera, panels)
         plotter.subplot(0, len(views))
-        plotter.add_scalar_bar(
+        bar = plotter.add_scalar_bar(
             title, mapper=actor.mapper, vertical=True, color=style.ink, n_labels=5,
-            label_font_size=int(1.4 * small), title_font_size=int(1.4 * small), fmt="%.3g",
+            label_font_size=int(1.2 * small), title_font_size=int(1.2 * small), fmt="%.3g",
             position_x=0.2, position_y=0.12, width=0.55, height=0.7,
         )  # fmt: skip
+        for text in (bar.GetLabelTextProperty(), bar.GetTitleTextProperty()):
+            text.SetFontFile(FONT)
+            text.SetFontFamily(VTK_FONT_FILE)
         plotter.subplot(0, 0)
 
         def show(frame: int) -> Image:
             set_frame(panels, frame, limits[1])
             plotter.subplot(0, 0)
             stamp = f"t = {1e3 * views[0].times[frame]:.2f} ms"
-            plotter.add_text(stamp, position=(0.66, 0.03), viewport=True, font_size=small,
-                             color=style.ink, name="time", render=False)  # fmt: skip
+            plotter.add_text(
+                stamp, position=(0.66, 0.03), viewport=True, font_size=0.85 * small, font_file=FONT,
+                color=style.ink, name="time", render=False,
+            )  # fmt: skip
             plotter.render()  # otherwise the screenshot is the previous picture
             return np.asarray(plotter.screenshot(None, return_img=True, scale=style.oversampling))
 
@@ -223,10 +230,10 @@ def _draw_panel(
     plotter.add_mesh(panel.focus, color="black", point_size=15 * pixel, **balls)
     own = colour(view.column)
     plotter.add_text(label(view.column), position=(0.04, 0.92), viewport=True,
-                     font_size=1.25 * small,
+                     font_size=1.1 * small, font_file=FONT,
                      color=style.ink if own == "#000000" else own)  # fmt: skip
     plotter.add_text(scale_text(view), position=(0.04, 0.86), viewport=True,
-                     font_size=0.9 * small, color=style.ink)  # fmt: skip
+                     font_size=0.75 * small, font_file=FONT, color=style.ink)  # fmt: skip
     _add_scale_bar(plotter, view, style, small)
     return actor
 
@@ -239,7 +246,8 @@ def _add_scale_bar(plotter: Any, view: View, style: Style, small: float) -> None
     ends = np.array([[left, front - 5, bottom], [left + BAR, front - 5, bottom]])
     plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=4 * small / 11)
     plotter.add_point_labels(
-        ends.mean(axis=0)[None] - [0.0, 3.0, 0.0], [f"{BAR:g} mm"], font_size=int(1.35 * small),
+        ends.mean(axis=0)[None] - [0.0, 3.0, 0.0], [f"{BAR:g} mm"], font_size=int(1.2 * small),
+        font_file=FONT,
         text_color=style.ink, shape=None, show_points=False, always_visible=True,
         justification_horizontal="center", justification_vertical="top",
     )  # fmt: skip

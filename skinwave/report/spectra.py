@@ -22,7 +22,7 @@ from skinwave.report.figures import (
     run_label,
     with_style,
 )
-from skinwave.report.palette import colour, ink_colour, label, line_style, marker
+from skinwave.report.palette import colour, dashes, ink_colour, label, line_style, marker
 from skinwave.report.styles import NARROW, SHOWN, Style
 from skinwave.results.run import Run
 from skinwave.typing import Floats
@@ -88,7 +88,9 @@ def _legend(figure: Figure, runs: list[Run]) -> int:
     entries: dict[str, dict[str, Any]] = {}
     for run in runs:
         scale = run.response.record.text(_largest(run, runs))
-        entries[f"{run_label(run)}, 1 = {scale}"] = {**line_style(run.column), "lw": 2}
+        entries[f"{run_label(run)}, 1 = {scale}"] = {
+            **line_style(run.column), "ls": dashes(run.column), "lw": 2
+        }  # fmt: skip
     if kinds := dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
         entries[f"open: {', '.join(kinds)}"] = {
             "color": "0.3", "marker": "^", "mfc": "none", "ls": ""
@@ -123,7 +125,10 @@ def _draw_waveforms(ax: Axes, runs: list[Run], p: int) -> None:
     for run in runs:
         centred = _remove_mean(run, runs)[:, p] / _largest(run, runs)
         times = 1e3 * run.response.times[_common_end(run, runs)]
-        ax.plot(times, centred, color=ink_colour(run.column), lw=_width(run), zorder=_depth(run))
+        ax.plot(
+            times, centred, color=ink_colour(run.column), ls=dashes(run.column), lw=_width(run),
+            zorder=_depth(run),
+        )  # fmt: skip
     ax.margins(x=0)
     ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
     ax.set_ylim(-1.1, 1.1)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simple_model.numbers import decibel
+from simple_model.numbers import decibel, plural
 from simple_model.quantities import DISPLACEMENT
 from skinwave.results.run import OfTacton, Run
 from skinwave.scene.scene import Scene
@@ -121,7 +121,7 @@ def is_resolved(run: NamedLines, claim: str) -> bool:
 
 def _single_line(runs: Sequence[NamedLines]) -> Assessment:
     worst = max(rival_levels(run).max() for run in runs)
-    sentence = f"the strongest line other than f_AM is at {decibel(worst)} dB re f_AM"
+    sentence = f"the strongest line other than f_AM is at {decibel(worst, signed=True)} dB re f_AM"
     return worst < ABSENT, worst, ABSENT, sentence
 
 
@@ -129,8 +129,8 @@ def _am_harmonics(runs: Sequence[NamedLines]) -> Assessment:
     second = min(_strongest(run, ["2f_AM"]) for run in runs)
     third = min(_strongest(run, ["3f_AM"]) for run in runs)
     weakest = min(second, third)
-    levels = f"{decibel(second)} dB and of 3 f_AM {decibel(third)} dB re f_AM"
-    sentence = f"the lowest level of 2 f_AM is {levels}"
+    levels = f"{decibel(second, signed=True)} dB re f_AM, that of 3 f_AM"
+    sentence = f"the lowest level of 2 f_AM is {levels} {decibel(third, signed=True)} dB"
     return weakest > PRESENT, weakest, PRESENT, sentence
 
 
@@ -162,8 +162,8 @@ def _pairs_only(runs: Sequence[NamedLines]) -> Assessment:
     drawn = max(_strongest(run, ["f_d", "2f_d", "3f_d"], "f_AM") for run in runs)
     weakest = min(min(_strongest(run, [name], "f_AM") for name in PAIRS) for run in runs)
     sentence = (
-        f"the strongest line at n f_d is at {decibel(drawn)} dB re f_AM, the weakest of the pairs "
-        f"n f_d ± f_AM (n = 1, 2) at {decibel(weakest)} dB"
+        f"the strongest line at n f_d is at {decibel(drawn, signed=True)} dB re f_AM, the weakest "
+        f"of the pairs n f_d ± f_AM (n = 1, 2) at {decibel(weakest, signed=True)} dB"
     )
     return drawn < ABSENT and weakest > PRESENT, drawn, ABSENT, sentence
 
@@ -172,8 +172,8 @@ def _both_multiples(runs: Sequence[NamedLines]) -> Assessment:
     drawn = min(_strongest(run, ["f_d"], "f_AM") for run in runs)
     double = min(_strongest(run, ["2f_AM"], "f_AM") for run in runs)
     sentence = (
-        f"in every Tacton f_d is at {decibel(drawn)} dB re f_AM or higher, and 2 f_AM at "
-        f"{decibel(double)} dB or higher"
+        f"the lowest level of f_d is {decibel(drawn, signed=True)} dB re f_AM, that of 2 f_AM "
+        f"{decibel(double, signed=True)} dB"
     )
     return drawn > PRESENT, drawn, PRESENT, sentence
 
@@ -193,7 +193,9 @@ def _am_highest_measured(runs: Sequence[NamedLines]) -> Assessment:
     holds, value, bar, sentence = _am_highest(runs)
     exceeded = [run.tacton for run in runs if rival_levels(run).max() >= 0]
     if exceeded:
-        sentence += f"; f_AM is exceeded in {', '.join(exceeded)}"
+        every = len(exceeded) == len(runs) > 1
+        names = f"all {len(runs)} Tactons" if every else ", ".join(exceeded)
+        sentence += f"; f_AM is exceeded in {names}"
     if runs[0].is_motion:  # a vibrometer reads velocity; the point kernel has no velocity
         velocity = max(rival_levels(run, velocity=True).max() for run in runs)
         sentence += f"; as velocity the strongest rival is at {decibel(velocity, signed=True)} dB"
@@ -206,10 +208,10 @@ def _much_lower(runs: Sequence[NamedLines]) -> Assessment:
     value, lower = max(levels), sum(bool(level < MUCH_LOWER) for level in levels)
     sentence = (
         f"the strongest multiple of f_AM or f_d is at {decibel(value, signed=True)} dB re f_AM; in "
-        f"{lower} of {len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe"
+        f"{lower} of {plural(len(runs), 'Tacton')} all are below {MUCH_LOWER:g} dB at every probe"
     )
     if value < PRESENT:
-        sentence += f"; no line that the claim is about is above {PRESENT:g} dB"
+        sentence += f"; all are below {PRESENT:g} dB, too weak to be visible"
     return bool(PRESENT <= value < MUCH_LOWER), value, MUCH_LOWER, sentence
 
 

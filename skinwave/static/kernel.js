@@ -5,6 +5,7 @@ import { drawingFrequency, gainAt, levelFactor, loadLines, positionOf, rhythmLev
 import { zeros } from "./numeric.js";
 
 const NEGLIGIBLE = 5.7; // widths of a Gaussian spot, beyond which it is below 1e-7
+const ROUND_OFF = 1e-9; // of the peak pressure: weaker lines at a point are 0
 
 /** Motion of the point kernel under a load, with the interface of a body's, in Pa in place of metre. */
 export function respond(load) {
@@ -31,7 +32,13 @@ export function respond(load) {
     }
     return { re, im };
   };
-  const at = (x, y) => onGrid([x], [y]);
+  const at = (x, y) => {
+    const { re, im } = onGrid([x], [y]);
+    re.forEach((own, l) => {
+      if (Math.hypot(own, im[l]) < ROUND_OFF * load.peak) re[l] = im[l] = 0;
+    });
+    return { re, im };
+  };
   const waveform = (x, y, times) => Float64Array.from(times, pressureAt(load, x, y));
   return { f, unit: "Pa", load, at, onGrid, waveform };
 }

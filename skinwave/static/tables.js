@@ -16,7 +16,8 @@ const subscript = (name) => escaped(name).replace(/_(\w+)/g, "<sub>$1</sub>");
 
 /** The four numbers of an answer as text; level and reach exist on skin only. */
 function numbersOf({ body, level, reach, share, delay }) {
-  const [above, far] = body.is_skin ? [`${signed(level?.dB)} dB`, distance(reach)] : [NONE, NONE];
+  const [above, far] = body.is_skin ? [level ? `${signed(level.dB)} dB` : "none", distance(reach)]
+    : [NONE, NONE];
   return { level: above, reach: far, share: percent(share), delay: milliseconds(delay) };
 }
 
@@ -37,7 +38,7 @@ export function tiles(answer, pinned) {
   const onSkin = (text) => (body.is_skin ? text : "not skin, no threshold");
   const details = { level: onSkin(line), reach: onSkin(reach ? "from the path" : ""), share: "of the motion",
     delay: "behind the pressure" };
-  const kernel = { level: `${signed(answer.kernelLevel?.dB)} dB`, reach: distance(answer.kernelReach),
+  const kernel = { level: answer.kernelLevel ? `${signed(answer.kernelLevel.dB)} dB` : "none", reach: distance(answer.kernelReach),
     share: percent(answer.kernelShare), delay: milliseconds(0) };
   return Object.entries(TILES).map(([key, [name, help]]) => `<div class="tile" title="${help}">
     <span class="name">${name}</span><span class="value">${own[key]}</span>

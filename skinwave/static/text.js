@@ -19,9 +19,10 @@ export function withUnit(value, unit) {
   return `${rounded(scale * value)} ${prefix}${unit}`;
 }
 
-/** Return a level with its sign: whole, or with one decimal if it is below 1. */
+/** Return a level with its sign: whole, or with one decimal if it is below 1; "< −120" if it is round-off. */
 export function signed(value) {
   if (!Number.isFinite(value)) return "–";
+  if (value < -120) return "< −120";
   const text = Math.abs(value).toFixed(Math.abs(value) < 0.95 ? 1 : 0);
   return Number(text) === 0 ? text : `${value > 0 ? "+" : "−"}${text}`;
 }

@@ -27,8 +27,7 @@ ASSUMPTIONS = {
     "little loss": "the material has its full damping",
     "viscous loss": "the damping is that of a standard linear solid, which equals the viscous one "
     "at the strongest line only",
-    "laterally-infinite": "the body has its own size and side conditions, and is meshed with "
-    "finite elements",
+    "laterally-infinite": "the body has its own size and side conditions",
     "alike in all directions": "stiffness and tension of the sheet differ by direction",
     "vacuum": "the air moves with the sheet",
     "main lobe only": "the focus has the side lobes of the array",

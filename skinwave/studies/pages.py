@@ -57,10 +57,10 @@ QUALITY = 88  # of pictures inside a page
 NAMED = 3  # lines that a sentence names
 NO_MOTION = "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
 ABOUT_MAPS = (
-    "Shares and spreads are computed from maps of 44 mm either way. The map of a slab is that of a "
-    "laterally infinite layer. For other bodies only the first Tacton has a map. The strongest "
-    "component has the largest amplitude at any probe. Its phase delay is known up to whole "
-    "periods. It includes the phase lag of a body that is driven away from a resonance."
+    "Shares and spreads come from maps that reach 44 mm from the origin along x and y. The map of "
+    "a slab is that of a laterally infinite layer. For other bodies only the first Tacton has a "
+    "map. The strongest component has the largest amplitude at any probe. Its phase delay is known "
+    "up to whole periods, and includes the phase lag of the body."
 )
 WAVEFORMS = "Waveforms and spectra; each row is a probe."
 LOADS = (
@@ -68,8 +68,8 @@ LOADS = (
     "other models have the load of the scene."
 )
 SENSATION = (
-    "Lines of the motion at the probe that moves most, and the detection threshold for a focal "
-    "spot on the hand (Verrillo 1963; Bolanowski et al. 1988), which is uncertain by 5 dB or more."
+    "Lines of the motion at the probe that moves most. The detection threshold for a focal spot on "
+    "the hand (Verrillo 1963; Bolanowski et al. 1988) is uncertain by 5 dB or more."
 )
 
 
@@ -147,7 +147,7 @@ def page_of(
         body.append(Details("How far the models agree", [tables.agreement_table(groups)]))
     effort = tables.effort_table(_efforts_by_body(runs), len(groups), seconds)
     body.append(Details("Effort", effort))
-    again: list[Part] = [f"Command: {command}"] if command else []
+    again: list[Part] = [preformat(command)] if command else []
     scene = [preformat(dumps(runs[-1].scene))] if is_single else []
     body.append(Details("The scene and the command", [*again, *notes, *scene]))
     caveats = [*description.quantity_notes(runs[-1].scene), *description.unresolved_lines(runs)]
@@ -158,8 +158,8 @@ def page_of(
         parts[1:1] = _first_parts(first, gallery)
         parts.insert(0, four_numbers(first))
         if not is_single:
-            verdict[0] = f"{first.kernel.tacton}, one of the Tactons below: {verdict[0]}"
-    return Report(title, verdict, parts, efforts_of(runs), PICTURES)
+            verdict[0] = f"Tacton {first.kernel.tacton}, one of {len(groups)}. {verdict[0]}"
+    return Report(title, [" ".join(verdict)] if verdict else [], parts, efforts_of(runs), PICTURES)
 
 
 def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
@@ -235,8 +235,7 @@ def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
 
 def sentences(first: FirstScreen) -> list[str]:
     """Return the verdict: what propagation changes, and what drive law and focus change."""
-    effect = first.effects[first.body.column]
-    return [_propagation_sentence(effect), _drive_sentence(first.kernel, first.published)]
+    return [_propagation_sentence(first), _drive_sentence(first.kernel, first.published)]
 
 
 def four_numbers(first: FirstScreen) -> Table:
@@ -252,13 +251,12 @@ def four_numbers(first: FirstScreen) -> Table:
         levels = (_sensation_text(each.highest_sensation) for each in effects)
         rows = [
             ("highest sensation level at the probes", None, levels),
-            ("above threshold up to this distance from the path", None,
-             map(_threshold_text, effects)),
+            ("reach above threshold, from the path", None, map(_threshold_text, effects)),
         ]  # fmt: skip
     else:
         rows = [
             ("largest displacement at the probes", None, map(_deflection_text, first.bodies)),
-            (f"above {NEAR:g} dB of the largest RMS up to this distance from the path",
+            (f"reach above {NEAR:g} dB of the largest RMS, from the path",
              _distance(effects[0].kernel_spread), (_distance(each.spread) for each in effects)),
         ]  # fmt: skip
     rows += [
@@ -267,7 +265,7 @@ def four_numbers(first: FirstScreen) -> Table:
         ("delay of the strongest component", "0 ms",
          (ms and f"{ms} ms" for ms in map(_millisecond, effects))),
     ]  # fmt: skip
-    name = f"{first.kernel.tacton}: same load"
+    name = f"{first.kernel.tacton}, same load"
     columns = [name, "point kernel", *(label(each.column) for each in effects)]
     return Table(columns, [[heading, kernel, *values] for heading, kernel, values in rows])
 
@@ -281,16 +279,18 @@ def _deflection_text(run: Run) -> str:
     return f"{text} (invalid: above half the thickness, where the sheet stiffens)"
 
 
-def _propagation_sentence(effect: Propagation) -> str:
+def _propagation_sentence(first: FirstScreen) -> str:
+    effect = first.effects[first.body.column]
     if effect.strongest is None:
         return NO_MOTION
     name, line = label(effect.column), effect.strongest
     if effect.share is None:
         return f"The {name} moves most at {line.frequency:.0f} Hz ({line.name})."
+    others = (e for e in first.effects.values() if e.share is not None and e is not effect)
+    also = "".join(f" ({label(each.column)}: {_share(each)})" for each in others)
     return (
-        f"{percent(effect.share)} of the mean-square motion of the {name} lies outside the "
-        f"kernel's {OUTSIDE:g} dB region. Motion within {-NEAR:g} dB of the largest extends to "
-        f"{_distance(effect.spread)} from the path; kernel: {_distance(effect.kernel_spread)}."
+        f"On the {name}, {_share(effect)} of the mean-square motion{also} lies outside the point "
+        f"kernel's {OUTSIDE:g} dB region."
     )
 
 
@@ -298,11 +298,11 @@ def _drive_sentence(kernel: Run, published: Run) -> str:
     names, pressure = added_lines(kernel, published), kernel.scene.pressure
     if pressure == published.scene.pressure:
         return "The load is the published one; only propagation differs from the paper's model."
-    law = f"Drive law and focus ({pressure.drive}, {pressure.profile_name})".replace("_", " ")
+    law = f"drive law and focus ({pressure.drive}, {pressure.profile_name})".replace("_", " ")
     if not names:
-        return f"{law} change amplitudes of components and add none."
+        return f"{law.capitalize()} change amplitudes of lines and add none."
     added = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
-    return f"{law} add {added}; propagation adds no component."
+    return f"The lines {added} come from {law}; linear propagation adds none."
 
 
 def _uncertainty(first: FirstScreen) -> str:
@@ -311,7 +311,7 @@ def _uncertainty(first: FirstScreen) -> str:
     if first.shares:
         low, high = (100 * share for share in first.shares)
         parts.append(
-            f"Over the range of material data the share outside is {interval(low, high)} %."
+            f"Over the range of material data, the share outside is {interval(low, high)} %."
         )
     if first.body.scene.body.of_kind.is_plate:
         parts.append(
@@ -331,7 +331,7 @@ def _threshold_text(effect: Propagation) -> str | None:
     if not effect.above_threshold:
         return None
     half, once, twice = (_millimetre(each) or "none" for each in effect.above_threshold)
-    return f"{once} mm ({half} to {twice})" if half != twice else f"{once} mm"
+    return f"{once} mm ({half} to {twice} mm)" if half != twice else f"{once} mm"
 
 
 def _component(component: Component | None, quantity: Quantity = DISPLACEMENT) -> str:

@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from fem import NotReduced
 from simple_model import Effort, MovingPressure, Response, lines, resolved_lines, sensation_level
 from simple_model.load.drive import usual_drive
-from simple_model.numbers import decibel, significant
+from simple_model.numbers import decibel, share_of, significant
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
 from skinwave.planning.assessment import all_warnings
@@ -43,7 +43,7 @@ from skinwave.studies.assumptions import (
     side_step,
     without,
 )
-from skinwave.system.document import Details, Part, Picture, Report
+from skinwave.system.document import Details, Part, Picture, Report, warnings_banner
 from skinwave.system.effort import Progress, peak_memory
 from skinwave.system.processes import pool
 from skinwave.system.table import Column, Table
@@ -62,22 +62,29 @@ LINE_COLUMNS = (
     "from_richest_db",
 )  # fmt: skip
 EFFECT_COLUMNS = (
-    Column("assumption", "dropped assumption"),
-    Column("waveform_percent", "change of the waveform", "% of the strongest probe"),
-    Column("at_mm", "at", "mm"), Column("level_db", "change of the sensation level", "dB"),
-    Column("alone_percent", "change as the only assumption", "%"),
-    Column("costs_s", "cost", "s", digits=2), Column("lines_db", "change of lines", "dB"),
+    "assumption", "waveform_percent", "at_mm", "level_db", "alone_percent", "costs_s", "lines_db",
 )  # fmt: skip
 STEP_COLUMNS = (
     "step", "model", Column("dofs", "degrees of freedom"),
-    Column("seconds", "time from the start", "s", digits=2), Column("memory_gib", "memory", "GiB"),
+    Column("seconds", "time", "s", digits=2), Column("memory_gib", "memory", "GiB", digits=2),
     Column("error", "reason of failure"),
 )  # fmt: skip
 INTRODUCTION = (
     "The steps lead from the published model to the richest one of this scene, one assumption "
     "after another. A pressure and a displacement are compared after the best-fitting factor."
 )
-BARS = "Change of the waveform, and of the sensation level (SL), by dropping each assumption."
+BARS = (
+    "Change of the waveform by dropping each assumption, over the motion of the strongest probe; "
+    "with the change of the sensation level (SL) on skin."
+)
+PAGE_COLUMNS = (
+    "dropped assumption", Column("change of the waveform", digits=2), "at, mm",
+    Column("change of the sensation level", unit="dB", digits=2),
+    Column("change if no other assumption is made", digits=2), "largest change of a line",
+    Column("extra time", unit="s", digits=2),
+)  # fmt: skip
+OUT_OF_NOTHING = 60.0  # dB: a line that changes by more appears or vanishes
+NEGLIGIBLE_TIME = 0.05  # s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -323,23 +330,31 @@ def line_changes(
 
 
 def sentence(e: Effect) -> str:
-    """Return a sentence on the effect and the cost of dropping an assumption."""
+    """Return sentences on the effect and the cost of dropping an assumption."""
+    return f"Without the assumption '{e.name}', {_change_text(e)}"
+
+
+def _change_text(e: Effect) -> str:
     x, y = (1e3 * v for v in e.where)
-    changes = [f"the waveform at ({x:g}, {y:g}) mm changes by {_change_words(e.waveform)}"]
-    if e.level is not None:
-        changes.append(f"the sensation level by {decibel(e.level, signed=True)} dB")
-    if e.decibel:
-        line = max(e.decibel, key=lambda name: abs(e.decibel[name]))
-        changes.append(f"the line {line} by {decibel(e.decibel[line], signed=True)} dB")
-    cost = f"It takes {e.seconds:.1f} s more." if e.seconds > 0.05 else "It takes no extra time."
-    return f"Without the assumption '{e.name}', {ASSUMPTIONS[e.name]}; {', '.join(changes)}. {cost}"
+    level = (
+        "" if e.level is None else f", the sensation level by {decibel(e.level, signed=True)} dB"
+    )
+    time = "no extra time" if e.seconds <= NEGLIGIBLE_TIME else f"{e.seconds:.1f} s more"
+    return (
+        f"the waveform at ({x:g}, {y:g}) mm changes by "
+        f"{share_of(e.waveform, 'the motion of the strongest probe')}{level}. Then "
+        f"{ASSUMPTIONS[e.name]}, which takes {time}."
+    )
 
 
-def _change_words(ratio: float) -> str:
-    """Return a change relative to the strongest probe in percent, or as a factor above 100 %."""
-    if ratio > 1:
-        return f"{significant(ratio, 2)} times the motion of the strongest probe"
-    return f"{significant(100 * ratio)} % of the strongest probe"
+def _line_change(changes: dict[str, float]) -> str | None:
+    """Return the line that changes most, and its change."""
+    if not changes:
+        return None
+    line = max(changes, key=lambda name: abs(changes[name]))
+    if abs(changes[line]) > OUT_OF_NOTHING:
+        return f"{line} {'appears' if changes[line] > 0 else 'vanishes'}"
+    return f"{line} {decibel(changes[line], signed=True)} dB"
 
 
 def write(folder: Path, hierarchy: Hierarchy) -> None:
@@ -353,32 +368,39 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
     np.savez(folder / "responses.npz", **arrays)  # type: ignore[arg-type]
     verdict = "No two steps can be compared, because too many failed."
     if effects:
-        verdict = sentence(effects[0])
+        verdict = (
+            f"The assumption with the largest effect is '{effects[0].name}': without it, "
+            f"{_change_text(effects[0])}"
+        )
+    (folder / "effects.csv").write_bytes(Table(EFFECT_COLUMNS, map(_effect_row, effects)).to_csv())
     steps = Table(STEP_COLUMNS, map(_step_row, hierarchy.every), "steps")
     parts: list[Part] = [
         Picture(png(_figure(effects), dpi=130), BARS, "relax"),
-        Table(EFFECT_COLUMNS, map(_effect_row, effects), "effects"),
-        Details("Steps", [INTRODUCTION, steps]),
-    ]
+        Table(PAGE_COLUMNS, map(_page_row, effects)),
+        Details("Steps and their warnings", [
+            INTRODUCTION, steps, warnings_banner(hierarchy.efforts),
+        ]),
+    ]  # fmt: skip
+    richest = [effort for effort in hierarchy.efforts if effort[0] == hierarchy.steps[-1].name]
     title = f"{hierarchy.scene.name}: assumptions, one by one"
-    Report(title, [verdict], parts, hierarchy.efforts).write(folder)
+    Report(title, [verdict], parts, richest).write(folder)
 
 
 def _figure(effects: list[Effect]) -> Figure:
     """Draw a bar for each assumption, the largest effect at the top."""
     figure = Figure(figsize=(7, 1 + 0.32 * len(effects)), layout="constrained")
     axes = figure.add_subplot()
-    changes = [100 * e.waveform for e in effects]
+    changes = [e.waveform for e in effects]
     bars = axes.barh([e.name.replace("^2", "²") for e in effects], changes, color=BLUE, height=0.7)
     texts = [
-        f"{significant(change)} %"
+        significant(e.waveform, 2)
         + ("" if e.level is None else f",  {decibel(e.level, signed=True)} dB SL")
-        for e, change in zip(effects, changes, strict=True)
+        for e in effects
     ]
     axes.bar_label(bars, texts, padding=4, fontsize=9)
     axes.invert_yaxis()
     axes.set_xlim(0, 1.3 * max(changes, default=1.0))
-    axes.set_xlabel("change of the waveform, % of the strongest probe")
+    axes.set_xlabel("change of the waveform over the motion of the strongest probe")
     axes.spines[["top", "right"]].set_visible(False)
     return figure
 
@@ -389,6 +411,12 @@ def _effect_row(e: Effect) -> list[object]:
         None if e.alone is None else 100 * e.alone, e.seconds,
         ", ".join(f"{name} {decibel(x, signed=True)}" for name, x in e.decibel.items()),
     ]  # fmt: skip
+
+
+def _page_row(e: Effect) -> list[object]:
+    where = f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})"
+    seconds = e.seconds if e.seconds > NEGLIGIBLE_TIME else None
+    return [e.name, e.waveform, where, e.level, e.alone, _line_change(e.decibel), seconds]
 
 
 def _step_row(step: HierarchyStep) -> list[object]:

@@ -27,8 +27,8 @@ LEVELS = (
     "f_AM may be weak there."
 )
 AGREEMENT = (
-    "Tacton", "what changes", "from, to", "waveform misfit at the best scale",
-    "misfit at the best gain and delay", "delay over the probes, ms",
+    "Tacton", "what changes", "models", "waveform misfit at the best scale",
+    "misfit at the best gain and delay", "delay at the probes, ms",
     "phase delay of the strongest component, ms", "spread over the probes at -6 / -20 dB, mm",
 )  # fmt: skip
 EFFORT = (
@@ -48,7 +48,7 @@ def lines_table(runs: Sequence[Run]) -> list[Part]:
     names = sorted(share, key=lambda name: -share[name])[:MOST_LINES]
     sensation = [sensation_levels(run, probe) for run in runs]
     rows = [
-        [name, f"{runs[0].line_hz[name]:.2f}"]
+        [name, f"{runs[0].line_hz[name]:.1f}"]
         + [cell for run, levels in zip(runs, sensation, strict=True)
            for cell in _amplitude(run, name, probe, levels)]
         for name in names
@@ -76,7 +76,9 @@ def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> 
     if not run.is_skin:
         return [size]
     level = levels[name]
-    return [size, f"{round(level):+d}" if level >= FAINTEST else decibel(level)]
+    if level < FAINTEST:
+        return [size, decibel(level)]
+    return [size, f"{round(level):+d}" if round(level) else "0"]
 
 
 def _unnamed_rows(runs: Sequence[Run], probe: int) -> Iterator[list[object]]:
@@ -132,17 +134,13 @@ def _disagreements(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
         if assessed.body == "none" or not assessed.claim.startswith("M") or assessed.holds:
             continue
         text = (
-            f"The {label(assessed.body)} contradicts {assessed.claim}, which was measured on "
-            f"paper: {assessed.sentence}."
+            f"The {label(assessed.body)} contradicts {assessed.claim}, which was measured on paper."
         )
         kernel = of_kernel.get(assessed.claim)
-        if kernel is not None and assessed.claim != "M2":  # M2 is about frequencies
-            same = "holds" if kernel.holds else "also fails"
-            text += (
-                f" In the point kernel under the same load it {same}, at {decibel(kernel.value)} "
-                f"dB instead of {decibel(assessed.value)} dB. The motion of the body causes the "
-                "difference."
-            )
+        if kernel is not None and kernel.holds:
+            text += " The point kernel under the same load does not, so the body is the cause."
+        elif kernel is not None:
+            text += " So does the point kernel under the same load."
         texts.append(text)
     return texts
 
@@ -153,7 +151,7 @@ def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Table:
     Drive law and focus change between the two kernels, propagation between kernel and body.
     """
     rows = [
-        [name, changed, f"{label(a.column)} to {label(b.column)}", *_agreement(a, b)]
+        [name, changed, f"{label(a.column)} → {label(b.column)}", *_agreement(a, b)]
         for name, group in runs.items()
         for changed, a, b in _pairs(group)
     ]
@@ -182,7 +180,7 @@ def _agreement(a: Run, b: Run) -> list[str]:
         _range(agreement.shape_misfit[moves]),
         _range(1e3 * agreement.delay[moves]),
         _range(1e3 * delays[np.isfinite(delays)]),
-        " to ".join(f"{1e3 * each[-6]:g} / {1e3 * each[-20]:g}" for each in spreads),
+        " → ".join(f"{1e3 * each[-6]:g} / {1e3 * each[-20]:g}" for each in spreads),
     ]
 
 

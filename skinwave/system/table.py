@@ -1,6 +1,7 @@
 """A table of a result: one definition for pages, CSV files and JSON."""
 
 import json
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -80,8 +81,9 @@ class Table:
     def html(self) -> Markup:
         """Return the table for a page; "-" where there is no value."""
         digits = [column.digits for column in self.columns]
-        rows = ([cell_text(v, n) for v, n in zip(row, digits, strict=True)] for row in self.rows)
-        return part("table", [column.title for column in self.columns], rows)
+        rows = [[cell_text(v, n) for v, n in zip(row, digits, strict=True)] for row in self.rows]
+        titles = [column.title for column in self.columns]
+        return part("table", titles, rows, [_is_numeric(rows, k) for k in range(len(titles))])
 
 
 def cell_text(value: Any, digits: int = 3) -> str:
@@ -93,6 +95,12 @@ def cell_text(value: Any, digits: int = 3) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:,}" if isinstance(value, int) else significant(float(value), digits)
+
+
+def _is_numeric(rows: Sequence[Sequence[str]], k: int) -> bool:
+    """Whether a column has numbers, and nothing else but "-" or empty cells."""
+    cells = {row[k] for row in rows} - {"-", ""}
+    return bool(cells) and all(re.sub("[,+.e-]", "", cell).isdigit() for cell in cells)
 
 
 def _is_known(value: Any) -> bool:

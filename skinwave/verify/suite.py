@@ -33,7 +33,7 @@ SCOPE = (
     "are relative unless marked as absolute. A case passes if each error is within its tolerance. "
     "The table shows the check nearest to its tolerance."
 )
-VALUES = ("value", "reference", "error", "tolerance", "")
+VALUES = ("value", "reference", "error", "tolerance", "result")
 
 
 def run_suite(
@@ -67,7 +67,7 @@ def page(results: list[Result], planned: int) -> Report:
     used = ", ".join(f"{name} {version}" for name, version in versions().items())
     spent = f"{sum(r.seconds for r in results):.0f} s with {used}."
     summary = Table(
-        ["case", "check nearest to the tolerance", *VALUES, "s"],
+        ["case", "check nearest to the tolerance", *VALUES, "time, s"],
         [[r.case.title, *_row(r.worst), r.seconds] for r in results],
     )
     topics = [

@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from simple_model.numbers import EN_DASH, significant
+from simple_model.numbers import EN_DASH, interval, significant
 from skinwave.report.figures import REPORT, png
-from skinwave.system.document import Details, Picture, Report, Section
+from skinwave.system.document import Details, Part, Picture, Report, Section, contents
 from skinwave.system.effort import Progress
 from skinwave.system.table import Column, Table
 from skinwave.verify import predictions
@@ -61,6 +61,12 @@ SPEEDS = (
     "line breaks where another mode leads, and ends where no wave propagates. Lengths are those of "
     "plane waves, without geometric spreading."
 )
+
+
+QUANTITY_COLUMNS = (
+    "independent comparisons", "values", "within", "too low", "median factor", "too high",
+    "median factor", "sources differ by a factor of up to",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,42 +176,58 @@ def verdict(rows: Sequence[Compared]) -> list[str]:
     sentences = [
         f"{within} of {len(own)} independent comparisons agree within the published spread or "
         f"{100 * READING_ERROR:g} %; {len(missed)} miss, by a factor of {_median(missed)} in the "
-        f"median; in {_count(own, NONE)} the model has no wave. {len(single) - len(own)} more "
-        "comparisons are of presets that were fitted to the source; they are no evidence."
+        "median.",
+        f"In {_count(own, NONE)} the model has no wave. {len(single) - len(own)} more comparisons "
+        "are of presets that were fitted to the source; they are no evidence.",
     ]
-    for quantity, words in ((SPEED, "Phase speeds"), (LENGTH, "1/e lengths"),
-                            (EXPONENT, "Decay exponents")):  # fmt: skip
-        alike = [row for row in own if row.published.quantity is quantity]
-        parts = [
-            f"{outcome} the published values in {len(group)} of {len(alike)} comparisons, by a "
-            f"factor of {_median(group)}"
-            for outcome in (BELOW, ABOVE)
-            if (group := [row for row in alike if row.outcome == outcome])
-        ]
-        sentences.append(f"{words} are {' and '.join(parts) or 'all within the spread'}.")
-    for quantity in (SPEED, LENGTH):
-        band = all_sources(quantity)
-        apart = max(high / low for low, high in zip(band.lows, band.highs, strict=True))
-        sentences.append(f"The sources differ in {quantity.name} by factors of up to "
-                         f"{significant(apart, 2)} at one frequency.")  # fmt: skip
-    optima = [f"{row.body} {significant(row.ours, 2)}" for row in own
-              if row.published.name.startswith(f"{OPTIMUM.name}, largest")]  # fmt: skip
+    for name, number, _, below, by, above, over, apart in _by_quantity(own):
+        parts = [f"{below} are too low, by a factor of {by} in the median"] * bool(below)
+        parts += [f"{above} are too high, by a factor of {over}"] * bool(above)
+        parts += [f"the sources differ by factors of up to {apart}"] * bool(apart)
+        sentences.append(f"{name.capitalize()}: of {number} values, {'; '.join(parts)}.")
+    optima: dict[str, list[float]] = {}
+    for row in own:
+        if row.published.name.startswith(f"{OPTIMUM.name}, largest"):
+            optima.setdefault(row.body, []).append(row.ours)
+    speeds = (f"{interval(min(x), max(x))} m/s on {name}" for name, x in optima.items())
     sentences.append(
-        f"Predicted focus speeds of the largest deflection are {', '.join(optima)} m/s; published "
-        f"are {OPTIMUM.lows[0]:g}{EN_DASH}{OPTIMUM.highs[0]:g} m/s."
+        f"The focus speed of the largest deflection is {' and '.join(speeds)}; published are "
+        f"{OPTIMUM.lows[0]:g}{EN_DASH}{OPTIMUM.highs[0]:g} m/s."
     )
     if lengths := [significant(1e3 * row.ours, 2) for row in rows if row.body == HAND]:
         sentences.append(f"Along a finger, motion falls to 1/e in {', '.join(lengths)} mm.")
     return sentences
 
 
+def _by_quantity(own: Sequence[Compared]) -> list[list[Any]]:
+    """Return a row for each quantity: number of independent values, those within, those below and
+    above with their median factors, and the largest factor between sources at one frequency.
+    """
+    rows: list[list[Any]] = []
+    for quantity in (SPEED, LENGTH, EXPONENT):
+        alike = [row for row in own if row.published.quantity is quantity]
+        below, above = ([r for r in alike if r.outcome == each] for each in (BELOW, ABOVE))
+        apart = None
+        if quantity is not EXPONENT:
+            band = all_sources(quantity)
+            ratios = (high / low for low, high in zip(band.lows, band.highs, strict=True))
+            apart = significant(max(ratios), 2)
+        misses = (
+            x for each in (below, above) for x in (len(each), _median(each) if each else None)
+        )
+        rows.append([quantity.name, len(alike), _count(alike, WITHIN), *misses, apart])
+    return rows
+
+
 def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
     """Return the page, with its figures and validation.csv."""
     sources = {row.published.name: row.published for row in rows}
-    return Report("Models and published measurements", [" ".join(verdict(rows))], [
-        _picture("factors", _factors, (10.5, 0.3 * len(sources) + 1.6), FACTORS, rows),
-        SCOPE,
-        _summary(rows),
+    first, *others = verdict(rows)
+    own = [row for row in rows if not row.is_built and not row.published.name.startswith(ALL)]
+    parts: list[Part] = [
+        _picture("factors", _factors, (10.5, 0.24 * len(sources) + 1.2), FACTORS, rows),
+        " ".join([others[0], *others[4:]]), SCOPE,
+        Details("Every set and preset", [_summary(rows)]),
         Details("Every value", [_table(rows)]),
         Section("Speed and decay of waves",
                 [_picture("waves", _waves, (11.5, 5.6), SPEEDS, curves)]),
@@ -214,7 +236,9 @@ def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
             [(s.name, s.site, s.conditions, s.source, s.how, s.remark) for s in sources.values()],
         )]),
         Details("Published but not compared", [Table(["source", "what", "reason"], NOT_COMPARED)]),
-    ])  # fmt: skip
+    ]  # fmt: skip
+    table = Table(QUANTITY_COLUMNS, _by_quantity(own))
+    return Report("Models and published measurements", [first], [table, contents(parts), *parts])
 
 
 def _count(rows: Iterable[Compared], outcome: str) -> int:

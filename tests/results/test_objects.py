@@ -211,7 +211,7 @@ def test_the_expected_error_has_the_same_text_everywhere(scene):
     found = skinwave.simulate(scene, "flat-body")
     assert stated_error(found.expected_error) == said
     assert 0 < found.to_pandas().attrs["expected_error"] == found.expected_error
-    assert error_budget(scene, found.expected_error).words.count(f"numerical {said}") == 1
+    assert error_budget(scene, found.expected_error).words.count(f"numerical error {said}") == 1
     for record in (found, skinwave.plan(scene, skinwave.SolveOptions(model="flat-body"))):
         assert said in record._repr_html_()
         assert f"expected error {said}" in repr(record)

@@ -210,7 +210,7 @@ def test_relax_writes_effects_and_costs(tmp_path, monkeypatch, capsys):
         assert {"t", "probes", "as published", "laterally-infinite"} <= set(kept.files)
     # In so short a Tacton 2 f_AM is not resolved from 3 f_d - 2 f_AM.
     assert {row["line"] for row in read_results.rows(out / "relax.csv")} >= {"f_AM", "2f_d", "f_d"}
-    assert coarse in (out / "index.html").read_text()
+    assert coarse in read_results.page(out / "index.html")
 
 
 def test_a_step_after_a_failed_one_has_no_effect():
