@@ -3,18 +3,20 @@
 import os
 from concurrent.futures import Future
 from contextlib import contextmanager
+from pathlib import Path
 
 if "PYTEST_XDIST_WORKER" in os.environ:  # before anything that reads it: a core each
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
-from corpus import SMALL
+from corpus import SMALL, contents
 from hypothesis import HealthCheck, settings
 from in_browser import chromium
 from shares import dealt
 
 import meshes
 from meshes import subprocess_call
+from skinwave.commands.cli import main
 from skinwave.verify import elements
 
 # The same examples every time, whatever the speed of the machine.
@@ -27,9 +29,7 @@ settings.load_profile("repeatable")
 
 @pytest.hookimpl(trylast=True)  # when `-m` has left tests out
 def pytest_collection_modifyitems(config, items):
-    """Modules with slow tests first in the equal share of all tests that each worker begins with:
-    what they take from each other in the end is short, and none is left with a long one.
-    """
+    """Slow modules first in the share that each worker begins with, so that none ends with one."""
     workers = getattr(config, "workerinput", {}).get("workercount", 1)
     if workers > 1:
         items[:] = dealt(items, workers)
@@ -62,6 +62,23 @@ def scene(tmp_path, monkeypatch):
     path = tmp_path / "short.toml"
     path.write_text(SMALL)
     return path
+
+
+@pytest.fixture
+def refused(capsys):
+    """The one line by which a command is refused; all in the working directory stays the same."""
+
+    def call(*arguments):
+        before = contents(Path.cwd())
+        assert main([*map(str, arguments)]) == 2
+        printed = capsys.readouterr()
+        assert printed.out == ""
+        assert printed.err.startswith("skinwave: ")
+        assert printed.err.count("\n") == 1
+        assert contents(Path.cwd()) == before
+        return printed.err
+
+    return call
 
 
 class Here:

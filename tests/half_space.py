@@ -8,11 +8,7 @@ WIDTH = 4.5e-3  # m, standard deviation of the pressure
 
 
 def boussinesq(poisson, r, z, width=WIDTH):
-    """Stresses rr, tt, zz and, z upwards, rz at a depth z below exp(-r^2 / 2 width^2) in Pa.
-
-    Johnson, Contact Mechanics (1985), section 3.2, by Love's function under Hankel's transform:
-    sigma_zz = -int q (1 + k z) e^(-k z) J0(k r) k dk and likewise the others.
-    """
+    """Stresses rr, tt, zz, rz below a Gaussian of 1 Pa; Johnson, Contact Mechanics, section 3.2."""
 
     def hankel(kernel):
         def integrand(k):

@@ -1,7 +1,4 @@
-"""Hostile files beyond those of `corpus.py`: from one seed, and so the same ones every time.
-
-Each is by name a function that writes into a folder and gives the arguments of a command.
-"""
+"""Hostile files, by name a function that writes into a folder and gives arguments of a command."""
 
 import copy
 import io
@@ -139,9 +136,9 @@ def patterns() -> dict[str, Write]:
     found = {}
 
     def add(name: str, suffix: str, content: bytes | str) -> None:
-        arguments = ("convert", "FILE", "out.toml", "--quiet")
         more = ("--rate", "1000") if suffix == ".csv" else ()
-        found[f"pattern, {name}"] = file(f"in{suffix}", content, *arguments, *more)
+        words = "convert", "FILE", "out.toml", "--quiet", *more
+        found[f"pattern, {name}"] = file(f"in{suffix}", content, *words)
 
     for name in ("\x1b[2J", "../../x", None):
         text = json.dumps(PATTERN | {"name": name})
@@ -319,16 +316,10 @@ def requests() -> dict[str, Write]:
  ["--seed", "-1"], ["--tolerance", "nan"],
     )]  # fmt: skip
     rates = ("nan", "1e308", "0")
-    asked += [
-        ["convert", "FILE", f"o{end}", "--rate", x] for end in (".wav", ".csv") for x in rates
-    ]
+    asked += [["convert", "FILE", f"o{e}", "--rate", x] for e in (".wav", ".csv") for x in rates]
     asked += [["convert", "FILE", name] for name in ("\0.wav", "a/b/c.wav", ".wav", "x.\x1b[2J")]
     text = tomli_w.dumps(QUICK)
     return {
-        f"request {k}, {' '.join(words)[:40]!a}": file("scene.toml", text, *_named(words))
+        f"request {k}, {' '.join(words)[:40]!a}": file("scene.toml", text, *words, "--quiet")
         for k, words in enumerate(asked)
     }
-
-
-def _named(words: list[str]) -> list[str]:
-    return [*words, "--quiet"]

@@ -7,37 +7,20 @@ import numpy as np
 import pytest
 
 from bench.layered_skin import RANGES, values_of
-from simple_model import flat_body
+from simple_model import MovingPressure, Tacton, flat_body
 from simple_model.layers.compliance import layered
 from skinwave.bodies import BODIES
-from skinwave.bodies.analytic import has_exact_waves, stack
+from skinwave.bodies.analytic import stack
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
-from skinwave.scene.file import loads
-from skinwave.scene.scene import Layer, Placement, solid_of
+from skinwave.scene.scene import Body, Layer, Scene, solid_of
 from skinwave.verify.predictions import leading_wave
 
-SKIN = loads("""
-[tacton]
-am_frequency_hz = 140
-duration_s = 0.05
-
-[body]
-kind = "slab"
-material = "muscle"
-thickness_mm = 15
-
-[[body.layers]]
-thickness_mm = 0.3
-material = "epidermis"
-
-[[body.layers]]
-thickness_mm = 4
-material = "fat"
-
-[probes]
-points_mm = [[0, 0], [10, 0]]
-""")
+LAYERS = (Layer(thickness=0.3e-3, material="epidermis"), Layer(thickness=4e-3, material="fat"))
+SKIN = Scene(
+    pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05)),
+    body=Body(material="muscle", layers=LAYERS), probes=((0.0, 0.0), (0.01, 0.0)),
+)  # fmt: skip
 TIMES = np.arange(500) / 1e4
 
 
@@ -59,13 +42,6 @@ def test_a_slab_is_the_stack_of_its_layers(body, base, last):
     assert found.materials == tuple(map(solid_of, ("epidermis", "fat", "muscle")))
     assert found.thicknesses == pytest.approx((0.3e-3, 4e-3, last))
     assert found.base == base or last == inf
-
-
-def test_exact_waves_need_a_layer_with_loss():
-    still = replace(solid_of("fat"), viscosity=0.0)
-    assert has_exact_waves(changed(layers=(Layer(thickness=1e-3, material=still),)).body)
-    assert not has_exact_waves(changed(layers=(), material=still).body)
-    assert not has_exact_waves(changed(placement=Placement(tilt_x=0.1)).body)
 
 
 @pytest.mark.parametrize("body", [{}, {"base": "absorbing"}])

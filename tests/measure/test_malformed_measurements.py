@@ -4,10 +4,8 @@ import io
 
 import measurement_files as files
 import numpy as np
-from corpus import contents
+import pytest
 from scipy.io import savemat, wavfile
-
-from skinwave.commands.cli import main
 
 HEAD = "t [s], v(0,0) [mm/s], v(5,0) [mm/s]\n"
 ROWS = "0, 1, 2\n0.001, 3, 4\n0.002, 5, 6\n"
@@ -105,41 +103,37 @@ BINARIES = [
 ]  # fmt: skip
 
 
-def refused(folder, capsys, arguments):
-    before = contents(folder)
-    assert main(["fit", "--inspect", *arguments, "--out", str(folder / "out")]) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert printed.err.startswith("skinwave: ")
-    assert printed.err.count("\n") == 1
-    assert contents(folder) == before
-    return printed.err
+@pytest.fixture
+def inspected(tmp_path, monkeypatch, refused):
+    """The sentence by which a measurement is refused."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: refused("fit", "--inspect", *arguments, "--out", "out")
 
 
-def test_malformed_text(tmp_path, capsys):
+def test_malformed_text(tmp_path, inspected):
     for text, named in TEXTS.items():
         (tmp_path / "a.csv").write_text(text)
-        assert named in refused(tmp_path, capsys, [str(tmp_path / "a.csv")])
+        assert named in inspected("a.csv")
 
 
-def test_malformed_binary(tmp_path, capsys):
+def test_malformed_binary(tmp_path, inspected):
     for name, make, options, named in BINARIES:
         content = make(tmp_path, name)
         (tmp_path / name).write_bytes(content)
-        assert named in refused(tmp_path, capsys, [str(tmp_path / name), *options])
+        assert named in inspected(name, *options)
 
 
-def test_wrong_options_and_no_file(tmp_path, capsys):
-    refused(tmp_path, capsys, [str(tmp_path / "none.csv")])
+def test_wrong_options_and_no_file(tmp_path, inspected):
+    inspected("none.csv")
     (tmp_path / "a.csv").write_text(HEAD + ROWS)
     for options, named in OPTIONS:
-        assert named in refused(tmp_path, capsys, [str(tmp_path / "a.csv"), *options])
+        assert named in inspected("a.csv", *options)
 
 
-def test_no_words_of_a_library_are_in_a_refusal(tmp_path, capsys):
+def test_no_words_of_a_library_are_in_a_refusal(tmp_path, inspected):
     for suffix in ("lvm", "tdms", "uff", "mat", "npz", "wav", "csv"):
         for content in (b"\x00\x01\x02" * 99, b"LabVIEW Measurement\t\n"):
             (tmp_path / f"a.{suffix}").write_bytes(content)
-            said = refused(tmp_path, capsys, [str(tmp_path / f"a.{suffix}"), *MM_S, "--rate", "9"])
+            said = inspected(f"a.{suffix}", *MM_S, "--rate", "9")
             for word in ("codec", "unpack", "zero-size", "buffer", "expected"):
                 assert word not in said

@@ -9,11 +9,10 @@ from fem.linear_solver import factorise
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import Body
 from skinwave.bodies.build import build, operators
-from skinwave.bodies.supports import Sides
 from skinwave.models import meshed, reduced
-from skinwave.models.meshed import axes_of_probes, mirrored_axes
+from skinwave.models.meshed import axes_of_probes
 from skinwave.planning.simulate import compute
-from skinwave.scene.scene import SURFACE, Scene
+from skinwave.scene.scene import Scene
 
 PATH = Trajectory(shape="circle", size=0.02, speed=8)
 CIRCLE = Tacton(am_frequency=140, duration=0.1, trajectory=PATH)
@@ -59,14 +58,6 @@ def test_lines_are_solved_on_the_even_part(monkeypatch):
     error = np.abs(part.displacement - whole.displacement).max()
     assert error < 1e-9 * np.abs(whole.displacement).max()
     assert part.effort.energy_imbalance < 1e-9
-
-
-def test_asymmetric_bodies_have_no_axes():
-    assert mirrored_axes(SLAB, SURFACE, reduced.PRESSURE) == "xy"
-    assert mirrored_axes(Body(kind="palm"), SURFACE, reduced.PRESSURE) == ""
-    ends = Sides(left="clamped", right="free", front="absorbing", back="absorbing")
-    one_sided = Body(kind="slab", sides=ends)
-    assert mirrored_axes(one_sided, SURFACE, reduced.PRESSURE) == "y"
 
 
 def test_half_of_a_coarse_disc_is_factorised():

@@ -7,7 +7,6 @@ import os
 import shlex
 import subprocess
 import sys
-from pathlib import Path
 from unittest.mock import Mock
 
 import corpus
@@ -54,30 +53,21 @@ def a_run(name="small"):
     return Run(tacton=name, body="none", scene=scene, response=response)
 
 
-def refused(capsys, *arguments):
-    before = corpus.contents(Path.cwd())
-    assert main([*map(str, arguments)]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1, said
-    assert corpus.contents(Path.cwd()) == before
-    return said
-
-
-def test_a_result_is_replaced_with_overwrite_only(folder, capsys):
+def test_a_result_is_replaced_with_overwrite_only(folder, refused):
     assert main([*RUN, "--out", "out"]) == 0
-    assert "--overwrite" in refused(capsys, *RUN, "--out", "out")
+    assert "--overwrite" in refused(*RUN, "--out", "out")
     assert main([*RUN, "--out", "out", "--overwrite"]) == 0
     assert {p.name for p in folder.iterdir()} == {"none.toml", "out"}
 
 
-def test_what_skinwave_did_not_write_is_never_replaced(folder, capsys):
+def test_what_skinwave_did_not_write_is_never_replaced(folder, refused):
     again = [*RUN, "--out", "out", "--overwrite"]
     (folder / "out").mkdir()
     (folder / "out/thesis.tex").write_text("mine")
     for fake in (None, "", "{}", '{"files": {"thesis.tex": 4}}'):
         if fake is not None:
             (folder / "out/record.json").write_text(fake)
-        assert "not written by skinwave" in refused(capsys, *again)
+        assert "not written by skinwave" in refused(*again)
 
 
 @posix
@@ -100,15 +90,15 @@ def test_a_file_that_the_user_added_or_changed_is_kept(folder):
     assert foreign_file(out) == out / "index.html"
 
 
-def test_inputs_are_never_replaced(folder, capsys, monkeypatch):
+def test_inputs_are_never_replaced(folder, refused, monkeypatch):
     out = make(folder / "out")
     (out / "none.toml").write_text(corpus.SILENT_GROUND)
     outputs.seal(out)
     asked = ["run", "out/none.toml", "--out", "out", "--overwrite", "--quiet"]
-    assert "in use" in refused(capsys, *asked)
-    refused(capsys, "convert", "none.toml", "none.toml", "--overwrite", "--quiet")
+    assert "in use" in refused(*asked)
+    refused("convert", "none.toml", "none.toml", "--overwrite", "--quiet")
     monkeypatch.chdir(out)
-    assert "in use" in refused(capsys, *RUN, "--out", "..", "--overwrite")
+    assert "in use" in refused(*RUN, "--out", "..", "--overwrite")
 
 
 def test_results_of_concurrent_commands_are_kept(folder):
@@ -181,14 +171,14 @@ def test_an_incomplete_run_is_removed(folder, monkeypatch):
     assert [run.tacton for run in open_album(folder / "out").runs] == ["small"]
 
 
-def test_a_full_disk_is_reported_in_one_sentence(folder, capsys, monkeypatch):
+def test_a_full_disk_is_reported_in_one_sentence(folder, refused, monkeypatch):
     def full(path, *given, **options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
     monkeypatch.setattr("pathlib.Path.write_text", full)
-    refused(capsys, *RUN, "--out", "out")
+    refused(*RUN, "--out", "out")
     monkeypatch.undo()
-    refused(capsys, *RUN, "--out", "n" * 300)
+    refused(*RUN, "--out", "n" * 300)
 
 
 def test_a_file_is_written_completely_or_not_at_all(folder):

@@ -1,5 +1,6 @@
 """Von Karman's plate in modes, against published tables, closed forms and least energies."""
 
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -15,9 +16,10 @@ from simple_model.plates.modes import Plate, plate_modes
 from simple_model.plates.path_forces import plate_lines
 from simple_model.plates.polynomials import gauss_points
 from simple_model.plates.von_karman import karman_plate
+from skinwave.bodies.supports import Mounting
 from skinwave.planning.simulate import compute
 from skinwave.results.comparison import compare
-from skinwave.scene.file import loads
+from skinwave.scene.scene import BODIES, Scene
 
 YOUNG, THICKNESS, SIDE, MASS = 4e9, 1e-4, 0.1, 0.08  # Pa, m, m, kg/m2
 FRAME = ("left", "right", "front", "back")
@@ -32,26 +34,6 @@ ORTHOTROPIC = Plate(
 LEVY = ((38.3, 0.471), (134.9, 1.121), (402.0, 1.902))
 PLASTIC = from_young(young=YOUNG, poisson=0.3, density=800, loss_factor=0.1, viscosity=1e5)
 DULL = from_young(young=YOUNG, poisson=0.3, density=800, loss_factor=0.6, viscosity=1e5)
-SHEET = """
-[tacton]
-am_frequency_hz = 140
-duration_s = 0.02
-shape = "circle"
-size_mm = 8
-speed_m_per_s = 5
-[focus]
-peak_pressure_pa = PRESSURE
-[body]
-kind = "sheet"
-material = "paper"
-size_x_mm = 30
-size_y_mm = 30
-thickness_mm = 0.1
-[body.mounting]
-edges = ["left", "right"]
-[probes]
-points_mm = [[0, 0], [4, 0]]
-"""
 
 
 def framed(support, nu=0.3, **more):
@@ -294,12 +276,15 @@ def test_values_of_plates_out_of_range_are_refused():
             karman_plate(modes, thickness, **more)
 
 
-def sheet(pressure, more=""):
-    return loads(SHEET.replace("PRESSURE", str(pressure)) + more)
+def sheet(pressure, **more):
+    mounting = Mounting(edges=("left", "right"))
+    paper = replace(BODIES["paper-sheet-loose"], width=0.03, height=0.03, mounting=mounting)
+    load = circling(0.008, 5.0, 140.0, 0.02, peak_pressure=pressure)
+    return Scene(pressure=load, body=paper, probes=((0.0, 0.0), (0.004, 0.0)), **more)
 
 
 def test_small_deflection_of_a_sheet_is_linear():
-    weak = sheet(0.01, "quantity = 'acceleration'")
+    weak = sheet(0.01, quantity="acceleration")
     found, linear = (
         compute(weak, name).values for name in ("plate-modes-nonlinear", "plate-modes-transient")
     )

@@ -15,7 +15,6 @@ from skinwave.scene.scene import BODIES, Body, Layer, Placement, Scene
 from skinwave.sweeps.measures import result_columns
 
 LAYERS = (Layer(thickness=1e-3, material="dermis"),)
-ABOVE = "; layers from the surface down: 1 mm of dermis"
 CORNERS = ((-0.01, 0.0), (0.01, 0.0), (0.01, 0.01))
 RECORDED = Trajectory(
     shape="recorded", times=(0, 0.1, 0.25), points=CORNERS, levels=(0.0, 1.0, 0.5)
@@ -90,25 +89,20 @@ def test_lines_next_to_unresolved_ones_are_not_assessed():
     assert not {"level_db", "sensation_line"} & row.keys()
 
 
-@pytest.mark.parametrize(
-    ("tacton", "row", "said"),
-    [
-        ({"am_frequency": 80, **SECOND}, "amplitude modulation",
-         "f_AM = 80 Hz, f_AM2 = 200 Hz, weights 0.25 and 0.75"),
-        ({"trajectory": RECORDED}, "focus", "a path recorded for 0.25 s with its own levels"),
-        ({"amplitude": 0.5, "rhythm": Rhythm(pulses=((0.03, 0.02),), ramp=0.005)}, "amplitude",
-         "50 % of full drive, 1 pulse in 50 ms with ramps of 5 ms"),
-    ],
-)  # fmt: skip
-def test_scene_rows_describe_the_tacton(tacton, row, said):
-    one = run(BODIES["skin-slab"], **tacton)
-    assert dict(scene_rows(one.scene))[row] == said
+def test_scene_rows_describe_the_tacton():
+    pulses = Rhythm(pulses=((0.03, 0.02),), ramp=0.005)
+    for tacton, row, numbers in (
+        ({"am_frequency": 80, **SECOND}, "amplitude modulation", "80 200 0.25 0.75"),
+        ({"trajectory": RECORDED}, "focus", "0.25"),
+        ({"amplitude": 0.5, "rhythm": pulses}, "amplitude", "50 50 5"),
+    ):
+        said = dict(scene_rows(run(BODIES["skin-slab"], **tacton).scene))[row]
+        assert set(numbers.split()) <= set(said.replace(",", "").split())
 
 
 def test_scene_rows_describe_placement_and_layers():
     place = Placement(tilt_x=np.radians(10), offset=(0.0, 0.005), lift=0.002)
     body = Body(layers=LAYERS, placement=place)
-    said = f"{ABOVE}; tilted by 10° about x and 0° about y; moved by (0, 5, 2) mm"
     one = run(body)
-    assert dict(scene_rows(one.scene))["body"].endswith(said)
-    assert said in model_paragraphs([one])[0]
+    for said in (dict(scene_rows(one.scene))["body"], model_paragraphs([one])[0]):
+        assert all(number in said for number in ("1 mm", "10°", "(0, 5, 2) mm"))

@@ -38,13 +38,6 @@ def swept(*arguments):
     return dataset.read(OUT)
 
 
-def refused(capsys, *arguments):
-    assert main([str(argument) for argument in arguments]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    return said
-
-
 def test_rows_have_the_order_of_the_design_and_are_not_repeated(scene, monkeypatch):
     vary = ["--vary", f"{SPEED}=8,4,70,6", f"{SIZE}=9,8", *KERNEL]
     rows = swept(*vary)
@@ -64,7 +57,7 @@ def test_rows_have_the_order_of_the_design_and_are_not_repeated(scene, monkeypat
     assert float(lines[0]["kernel_peak_pa[1]"]) == pytest.approx(rows[0]["kernel_peak_pa"][1])
 
 
-def test_wrong_keys_and_values_are_refused_in_one_sentence(scene, capsys):
+def test_wrong_keys_and_values_are_refused_in_one_sentence(scene, refused):
     for words in (
         "tacton.speed_m_s=1,2", "zzzz=1", "tacton.size_mm=", "tacton.shape=circle,sqare",
         "body=moon", "tacton.size_mm=1 tacton.size_mm=2", "tacton.size_mm=1:2:2.5",
@@ -73,45 +66,45 @@ def test_wrong_keys_and_values_are_refused_in_one_sentence(scene, capsys):
         "tacton.size_mm=1,2 --design latin", "tacton.size_mm=1,2 --workers 0",
         "tacton.size_mm=1,2 --scheduler cloud", "tacton.size_mm=1,2 --out .",
     ):  # fmt: skip
-        refused(capsys, "sweep", scene, "--vary", *words.split())
-    refused(capsys, "sweep", scene)
-    refused(capsys, "sweep", ".", "--plot")
+        refused("sweep", scene, "--vary", *words.split())
+    refused("sweep", scene)
+    refused("sweep", ".", "--plot")
     assert not OUT.exists()
 
 
-def test_missing_packages_and_schedulers_are_refused(scene, capsys, monkeypatch):
+def test_missing_packages_and_schedulers_are_refused(scene, refused, monkeypatch):
     vary = ["--vary", "tacton.size_mm=1,2", "--scheduler"]
     with monkeypatch.context() as patch:
         patch.setattr(engine, "find_spec", lambda name: None)
-        assert "skinwave[sweep]" in refused(capsys, "sweep", scene, *vary, "threads")
-        assert "skinwave[cluster]" in refused(capsys, "sweep", scene, *vary, "tcp://a:1")
+        assert "skinwave[sweep]" in refused("sweep", scene, *vary, "threads")
+        assert "skinwave[cluster]" in refused("sweep", scene, *vary, "tcp://a:1")
     monkeypatch.setattr(engine, "CONNECTION_TIMEOUT", 0.5)
     nowhere = "tcp://127.0.0.1:9"
-    assert nowhere in refused(capsys, "sweep", scene, *vary, nowhere)
+    assert nowhere in refused("sweep", scene, *vary, nowhere)
     assert sorted(path.name for path in scene.parent.iterdir()) == ["short.toml"]
 
 
-def test_changed_files_are_kept_and_other_tables_refused(scene, capsys):
+def test_changed_files_are_kept_and_other_tables_refused(scene, refused):
     vary = ["--vary", f"{SPEED}=4,6", *KERNEL]
     swept(*vary, "--csv", "--plot", "kernel_peak_pa")
     swept(*vary, "--csv", "--plot", "kernel_peak_pa")
     (figure,) = (OUT / "figures").iterdir()
     for path, words in ((OUT / "rows.csv", ["--csv"]), (figure, ["--plot", "kernel_peak_pa"])):
         path.write_bytes(b"mine")
-        assert path.name in refused(capsys, "sweep", OUT, *words)
+        assert path.name in refused("sweep", OUT, *words)
         assert path.read_bytes() == b"mine"
         path.unlink()
     pq.write_table(pa.table({"price": [1.0]}), OUT / "rows/part-mine.parquet")
-    refused(capsys, "sweep", "short.toml", *vary, *THREADS)
+    refused("sweep", "short.toml", *vary, *THREADS)
     (OUT / "rows/part-mine.parquet").write_text("no Parquet")
-    refused(capsys, "sweep", OUT, "--csv")
+    refused("sweep", OUT, "--csv")
 
 
-def test_only_one_sweep_writes_into_a_folder(scene, capsys):
+def test_only_one_sweep_writes_into_a_folder(scene, refused):
     folder = dataset.open_folder(OUT)
     arguments = ["sweep", "short.toml", "--vary", "body.thickness_mm=10,15", *THREADS]
     with dataset.lock_rows(folder):
-        assert "short-sweep" in refused(capsys, *arguments)
+        assert "short-sweep" in refused(*arguments)
     there = "import os, sys; from pathlib import Path; from skinwave.sweeps import dataset; "
     held = "held = dataset.lock_rows(Path(sys.argv[1])); held.__enter__(); os._exit(0)"
     subprocess.run([sys.executable, "-c", there + held, str(folder)], check=True)
@@ -174,7 +167,7 @@ def test_processes_and_a_cluster_give_the_same_table(scene, address):
         np.testing.assert_allclose(first, second, rtol=1e-10, atol=1e-12)
 
 
-def test_figures_have_units_and_names_in_every_format(scene, capsys):
+def test_figures_have_units_and_names_in_every_format(scene, capsys, refused):
     swept("--vary", f"{SPEED}=4,6", f"{SIZE}=8,10,70")
     for kind in ("png", "svg", "pdf"):
         drawn = ["sweep", "short-sweep", "--format", kind, "--quiet"]
@@ -188,7 +181,7 @@ def test_figures_have_units_and_names_in_every_format(scene, capsys):
     assert not any(b"/Type3" in file.read_bytes() for file in (OUT / "figures").glob("*.pdf"))
     capsys.readouterr()
     for words in (["peak"], ["sensation_line"], ["peak_um", "--vary", f"{SPEED}=1"]):
-        refused(capsys, "sweep", OUT, "--plot", *words)
+        refused("sweep", OUT, "--plot", *words)
 
 
 def test_a_material_with_varied_factors_is_not_a_varied_key():
