@@ -308,9 +308,7 @@ def lump(tmp_path_factory):
     file = tmp_path_factory.mktemp("coat") / "lump.vtu"
     meshes.write(file, replace(mesh, facets={}))
     layer = "\n[[body.layers]]\nthickness_mm = {}\nmaterial = 'forearm-epidermis'"
-    text = (
-        "[tacton]\nam_frequency_hz = 140\nduration_s = 0.03\n[probes]\npoints_mm = [[0,0],[5,0]]\n"
-    )
+    text = "[tacton]\nam_frequency_hz=140\nduration_s=0.03\n[probes]\npoints_mm=[[0, 0], [5, 0]]\n"
     text += f"[body]\nkind = 'mesh'\nfile = '{file}'\n"
     return {mm: loads(text + (layer.format(mm) if mm else "")) for mm in (0, 0.3)}
 

@@ -47,10 +47,8 @@ SCENE = Scene(pressure=LOAD, body=SHEET, probes=((0.0, 0.0), (0.01, 0.004)))
 
 
 def scene_of(body, **changes):
-    path = Trajectory(shape="circle", size=0.012, speed=5.0)
-    pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=path))
     probes = ((0.0, 0.0), (0.006, 0.0), (0.01, 0.004))
-    return Scene(pressure=pressure, body=body, probes=probes, **changes)
+    return Scene(pressure=LOAD, body=body, probes=probes, **changes)
 
 
 @pytest.fixture(scope="module")
@@ -271,9 +269,8 @@ def test_the_waveform_from_rest_is_that_of_the_sheets_own_body_and_balances_ener
     moving = np.linalg.norm(expected.values - expected.values.mean(axis=0))
     assert np.linalg.norm(found.values - expected.values) < 1e-3 * moving
     assert found.effort.energy_imbalance < 1e-6
-    free = [
-        np.abs(each.poles.values).min() for each in (parametric.at(prepared_sheet, values), own)
-    ]
+    both = parametric.at(prepared_sheet, values), own
+    free = [np.abs(each.poles.values).min() for each in both]
     assert free[0] == pytest.approx(free[1], rel=1e-4)
 
 

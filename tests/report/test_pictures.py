@@ -35,9 +35,7 @@ from skinwave.studies import album, pages, report
 
 ONLY = "point-kernel-published,point-kernel,skin-slab"
 ARTEFACTS = Path(__file__).parents[2] / ".ci" / "artefacts"
-draws = pytest.mark.skipif(
-    "not renderer().is_available", reason="nothing draws in three dimensions here"
-)
+draws = pytest.mark.skipif("not renderer().is_available", reason="nothing draws solids here")
 NO_GL = Renderer(is_available=False, detail="missing; apt install libegl1 libgl1-mesa-dri")
 
 

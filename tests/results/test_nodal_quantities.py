@@ -26,9 +26,7 @@ from skinwave.scene.scene import Body, Layer, Scene
 from skinwave.studies import album, report
 from skinwave.studies.pages import Gallery
 
-draws = pytest.mark.skipif(
-    "not renderer().is_available", reason="nothing draws in three dimensions here"
-)
+draws = pytest.mark.skipif("not renderer().is_available", reason="nothing draws solids here")
 PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
 SCENE = Scene(
     pressure=MovingPressure(tacton=Tacton(trajectory=PATH, duration=0.05, am_frequency=100)),

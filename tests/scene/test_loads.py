@@ -1,4 +1,4 @@
-"""Loads beside pressure: shear tractions, forces of a small contact, and gravity."""
+"""Loads beside pressure: shear tractions, forces of a small contact, gravity, moving supports."""
 
 from dataclasses import replace
 from math import pi
@@ -73,9 +73,7 @@ points_mm = [[0, 0], [2, 1]]
 """
 SHAKEN = "[load]\nsupport_motion = { amplitude_um = 5, frequency_hz = 140 }\n"
 STILL = '[body]\nsides = "free"\n'
-ADRIFT = (
-    '[body]\nbase = "free"\nsides = {left="free", right="free", front="free", back="absorbing"}'
-)
+ADRIFT = '[body]\nbase="free"\nsides={left="free", right="free", front="free", back="absorbing"}'
 
 
 def far(found, expected):

@@ -95,9 +95,8 @@ def test_a_rhythm_and_a_signal_have_side_lines():
     side = 50 * np.sin(5 / 8 * np.pi) / np.pi
     assert found["f_AM-f_r"][0] == pytest.approx(side, rel=0.01)
     assert found["f_AM+f_r"][0] == pytest.approx(side, rel=0.01)
-    wave = simple_model.Signal(
-        rate=1200, samples=tuple(np.sin(2 * np.pi * np.arange(12) / 12).tolist())
-    )
+    samples = tuple(np.sin(2 * np.pi * np.arange(12) / 12).tolist())
+    wave = simple_model.Signal(rate=1200, samples=samples)
     load, response = answered(am_frequency=30, signal=wave)
     found = line_table(load, response).amplitudes
     assert max(found, key=lambda name: found[name][0]) in ("f_AM-f_s", "f_s-f_AM", "f_AM+f_s")

@@ -11,9 +11,8 @@ from skinwave.planning.simulate import compute
 
 BOTH = {"second_am_frequency": 101.0, "superposition": (0.5, 0.5)}
 PULSES = simple_model.Rhythm(pulses=((0.05, 0.03),))
-SHARED = simple_model.joined(
-    [Trajectory(shape="circle", size=0.02), Trajectory(shape="point")], 185.0
-)
+PATHS = [Trajectory(shape="circle", size=0.02), Trajectory(shape="point")]
+SHARED = simple_model.joined(PATHS, 185.0)
 D_MM = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 25])
 SHORT = Tacton(am_frequency=140, duration=0.003)
 SKIN = skinwave.Body(width=0.04, height=0.04, depth=0.01)
@@ -103,9 +102,8 @@ def on_axis(mm):
 
 
 def array_intensity(points, height):
-    p = simple_model.array_field(
-        np.column_stack([points, np.full(len(points), height)]), (0, 0, height)
-    )
+    places = np.column_stack([points, np.full(len(points), height)])
+    p = simple_model.array_field(places, (0, 0, height))
     return np.abs(p) ** 2
 
 

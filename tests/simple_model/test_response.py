@@ -53,9 +53,8 @@ def test_windows_match_scipy():
 
 
 def kernel(am=0.0, size=0.0, speed=0.0, drive="linear", probes=PROBES):
-    tacton = Tacton(
-        am_frequency=am, trajectory=simple_model.Trajectory(shape="circle", size=size, speed=speed)
-    )
+    path = simple_model.Trajectory(shape="circle", size=size, speed=speed)
+    tacton = Tacton(am_frequency=am, trajectory=path)
     load = MovingPressure(tacton=tacton, profile="main_lobe", drive=drive, peak_pressure=1.0)
     return load, point_kernel(load, probes, SECOND)
 

@@ -16,9 +16,7 @@ from skinwave.sweeps.measures import result_columns
 
 LAYERS = (Layer(thickness=1e-3, material="dermis"),)
 CORNERS = ((-0.01, 0.0), (0.01, 0.0), (0.01, 0.01))
-RECORDED = Trajectory(
-    shape="recorded", times=(0, 0.1, 0.25), points=CORNERS, levels=(0.0, 1.0, 0.5)
-)
+RECORDED = Trajectory(shape="recorded", times=(0, 0.1, 0.25), points=CORNERS, levels=(0, 1, 0.5))
 SECOND = {"second_am_frequency": 200, "superposition": (0.25, 0.75)}
 
 
