@@ -47,12 +47,12 @@ def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> t
     assert chosen.h
     if chosen.prepared.effort.dofs > LARGEST:
         raise ValueError(f"{chosen.prepared.effort.dofs} degrees of freedom")
-    planned = answer(chosen.prepared, replace(scene, body=chosen.body))
+    planned_scene = replace(scene, body=chosen.body)
+    planned = answer(chosen.prepared, planned_scene)
     fine = prepare(
-        chosen.body, scene.probe_points, h=chosen.h / 2, tolerance=REFERENCE,
-        symmetry=chosen.symmetry, reading=scene.reading, load=scene.load,
-    )  # fmt: skip
-    better = answer(fine, replace(scene, body=chosen.body)).values
+        planned_scene, SolveOptions(h=chosen.h / 2), symmetry=chosen.symmetry, reduction=REFERENCE
+    )
+    better = answer(fine, planned_scene).values
     stated, true = (about_its_rest(scene, each) for each in (planned.values, better))
     return chosen.error, float(relative_changes(true - stated, true).max())
 

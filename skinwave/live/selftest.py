@@ -11,11 +11,12 @@ from skinwave.bodies.analytic import compliance
 from skinwave.live.packs import pack_method
 from skinwave.live.radial import LOWEST
 from skinwave.live.values import control_values
+from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import answer, components, prepare
 from skinwave.planning.simulate import compute
-from skinwave.scene.scene import Body, Scene
+from skinwave.scene.scene import STILL, Body, Scene
 from skinwave.typing import Complex, Floats
 
 SEED = 15
@@ -71,7 +72,8 @@ def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
         model = "flat-body" if method == "radial" else FROM_REST.name
         lines_of = _lines_of_layers if method == "radial" else _lines_of_sheet
         return lines_of, lambda scene: compute(scene, model).values[:, 0], ()
-    prepared = prepare(body, np.array(PLACES), h=h or body.of_kind.interactive_size)
+    size = SolveOptions(h=h or body.of_kind.interactive_size)
+    prepared = prepare(Scene(pressure=STILL, body=body, probes=PLACES), size)
 
     def index(scene: Scene) -> int:
         return int(np.linalg.norm(np.array(PLACES) - scene.probes[0], axis=1).argmin())

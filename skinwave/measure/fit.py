@@ -16,8 +16,7 @@ from skinwave.measure.observed import KINDS, data_of
 from skinwave.measure.parameters import Parameter, check_limits, of_scene, parse
 from skinwave.measure.predicted import Target, target, with_reduction
 from skinwave.measure.search import Problem, Solution, solve
-from skinwave.models.flat_body import FLAT_BODY
-from skinwave.models.limits import takes
+from skinwave.planning.plan import model_from_rest
 from skinwave.scene.distributions import Distribution
 from skinwave.scene.file import to_table, with_distributions
 from skinwave.scene.keys import DERIVED, LOSSES, SCALES, value_at, write_material
@@ -101,7 +100,7 @@ def fit(
         and "offset_y_mm" of the measurement
     tie : texts "KEY=expression" of keys that vary
     kind : "waveforms", "lines" or "amplitudes"; by default waveforms or, for spectra, lines
-    model : name of a model, or "auto": the wavenumber integral for flat bodies, else "fem"
+    model : name of a model, or "auto": that of the plan, from rest
     starts : number of starts between the limits
     seed : of the starts
     progress : called with the name of the phase and the fraction done
@@ -114,7 +113,7 @@ def fit(
     parameters = parse(vary, tie)
     kind = choose("kind", kind or ("lines" if measured.is_spectrum else "waveforms"), KINDS)
     if model == "auto":
-        model = FLAT_BODY.name if takes(FLAT_BODY, scene) else "fem"
+        model = model_from_rest(scene)[0].name
     aim = target(scene, model, measured.record, measured.places)
     check_limits(scene, parameters)
     aim = with_reduction(aim, parameters, progress)

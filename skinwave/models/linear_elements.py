@@ -26,7 +26,7 @@ from skinwave.models import Limit, Model, meshed, register
 from skinwave.models.laws import has_own_law, relaxing, series_tolerance
 from skinwave.models.limits import frame_air_limits, of_body, vacuum_limits
 from skinwave.models.options import SolveOptions, response_of, solver_name
-from skinwave.models.reduced import answer, prepare, reduction_tolerance
+from skinwave.models.reduced import answer, prepare
 from skinwave.scene.load import SupportMotion
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Clock, Progress
@@ -115,11 +115,7 @@ def _limits(
 
 
 def _solve_reduced(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    prepared = prepare(
-        scene.body, scene.probe_points, options.progress, h=options.h, solver=options.solver,
-        tolerance=reduction_tolerance(options.tolerance), reading=scene.reading, load=scene.load,
-    )  # fmt: skip
-    return answer(prepared, scene, options.progress, times=times)
+    return answer(prepare(scene, options), scene, options.progress, times=times)
 
 
 def transient_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:

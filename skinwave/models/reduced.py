@@ -1,7 +1,7 @@
 """Reduced bodies: the offline stage, which is cached, and the response to any load.
 
     reduce_body: body, outputs, surface load -> ReducedBody
-    prepare:     body, probes -> ReducedBody that its probes read, once per machine
+    prepare:     scene -> ReducedBody that its probes read, once per machine
     respond:     ReducedBody, moving pressure -> ReducedResponse
     answer:      ReducedBody, scene -> Response from rest
 
@@ -35,7 +35,7 @@ from skinwave.bodies.sheet import air
 from skinwave.bodies.sizes import default_size
 from skinwave.models import meshed
 from skinwave.models.laws import relaxing
-from skinwave.models.options import sample_times, solver_name
+from skinwave.models.options import DEFAULT, SolveOptions, sample_times, solver_name
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import SURFACE, Body, Reading, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
@@ -105,31 +105,28 @@ class ReducedResponse:
 
 
 def prepare(
-    body: Body,
-    probes: Floats,
-    progress: Progress | None = None,
+    scene: Scene,
+    options: SolveOptions = DEFAULT,
     *,
-    h: float | None = None,
-    solver: str = "auto",
-    tolerance: float = REDUCTION_TOLERANCE,
     symmetry: str = "",
-    reading: Reading = SURFACE,
-    load: Load = PRESSURE,
+    reduction: float | None = None,
     discretise: Discretise | None = None,
 ) -> ReducedBody:
-    """Mesh, assemble, factorise and reduce a body: once for all Tactons, and once per machine
-    thanks to the cache.
+    """Mesh, assemble, factorise and reduce the body of a scene, once for all Tactons and, by the
+    cache, once per machine.
 
-    If all probes (p, 2) in m lie on a symmetry plane of the body, only one half is modelled.
-    `progress`, `h` and `solver` are as in `SolveOptions`; `tolerance` is the relative error of the
-    reduction; `symmetry`, axes across which all loads are symmetric, applies to normal motion under
-    a pressure; `discretise` replaces the mesh of the body's kind.
+    If all probes lie on a symmetry plane of the body, one half is modelled. `symmetry`, the axes
+    across which all loads are symmetric, applies to normal motion under a pressure. `reduction` is
+    the relative error of the reduction, by default `reduction_tolerance` of the options, and
+    `discretise` replaces the mesh of the body's kind.
     """
-    clock, report = Clock(), progress or silent
-    body = relaxing(body, SERIES_ERROR * tolerance)
+    clock, report, solver = Clock(), options.progress, options.solver
+    probes, reading, load = scene.probe_points, scene.reading, scene.load
+    tolerance = reduction or reduction_tolerance(options.tolerance)
+    body = relaxing(scene.body, SERIES_ERROR * tolerance)
     symmetry = meshed.modelled_axes(body, probes, symmetry, reading, load)
     report("mesh", 0.0)
-    build = meshed.mesh_body(body, h, clock, silent, symmetry, discretise)
+    build = meshed.mesh_body(body, options.h, clock, silent, symmetry, discretise)
     outputs, solids = meshed.probe_rows(body, build, meshed.images(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
     name = entry_name(body, build, probes, solver, tolerance, outputs=own, load=load)
@@ -141,7 +138,7 @@ def prepare(
         reduced = replace(reduced, probes=probes)
         store_record(name, reduced)
     # Another size may have made the same mesh.
-    effort = meshed.with_cost(reduced.effort, clock, build, h or default_size(body))
+    effort = meshed.with_cost(reduced.effort, clock, build, options.h or default_size(body))
     return replace(reduced, reading=reading, solids=solids, load=load, effort=effort)
 
 

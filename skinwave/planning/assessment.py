@@ -8,19 +8,17 @@ costs a tenth as much and overestimates errors by up to a half.
 from dataclasses import replace
 from functools import lru_cache
 
-import numpy as np
-
 from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.reduced import ReducedBody, answer, prepare, reduction_tolerance
+from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.planning import errors, refinement
 from skinwave.planning.extent import absorbing_error
 from skinwave.planning.left_out import stretching_error
 from skinwave.planning.plan import plan
 from skinwave.planning.plan_warnings import response_warnings
-from skinwave.scene.scene import Body, Load, Reading, Scene
+from skinwave.scene.scene import Body, Scene, without_tacton
 from skinwave.typing import Array
 
 Coarser = tuple[float, ReducedBody]  # element size in m, and the body with it
@@ -75,9 +73,7 @@ def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
     """Return the element size in m that `assess` compares with, and the body on that mesh."""
     body, h = scene.body, options.h
     other = refinement.comparison_size(body, h) if h else _coarser_size(body, default_size(body))
-    reduction = reduction_tolerance(options.tolerance)
-    parts = body, scene.probes, scene.reading, scene.load
-    return other, _prepare(*parts, other, options.solver, reduction)
+    return other, _prepare(without_tacton(scene), other, options.solver, options.tolerance)
 
 
 def all_warnings(
@@ -105,10 +101,5 @@ def _coarser_size(body: Body, h: float) -> float:
 
 
 @lru_cache(maxsize=4)  # of Tactons on the same bodies
-def _prepare(
-    body: Body, probes: tuple[tuple[float, float], ...], reading: Reading, load: Load,
-    h: float, solver: str, tolerance: float,
-) -> ReducedBody:  # fmt: skip
-    return prepare(
-        body, np.array(probes), h=h, solver=solver, tolerance=tolerance, reading=reading, load=load
-    )
+def _prepare(scene: Scene, h: float, solver: str, tolerance: float) -> ReducedBody:
+    return prepare(scene, SolveOptions(h=h, solver=solver, tolerance=tolerance))

@@ -57,9 +57,8 @@ def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -
 
     def waveforms(wider: float, reduction: float) -> Floats:
         prepared = prepare(
-            body, scene.probe_points, options.progress, h=size, symmetry=axes,
-            solver=options.solver, tolerance=reduction, reading=scene.reading, load=scene.load,
-            discretise=partial(discretise, wider=wider),
+            replace(scene, body=body), replace(options, h=size), symmetry=axes,
+            reduction=reduction, discretise=partial(discretise, wider=wider),
         )  # fmt: skip
         return about_its_rest(scene, answer(prepared, scene).values)
 

@@ -165,7 +165,8 @@ def stretching_error(scene: Scene, model: Model, tolerance: float) -> float:
     If the deflection is small, its square bounds the error. Otherwise `plate-modes-nonlinear`
     measures it in the displacement, if this model takes the scene.
     """
-    if model.is_nonlinear or not model.needs_body:
+    is_linear = model.needs_body and not model.is_nonlinear
+    if not (is_linear and scene.body.of_kind.is_plate):
         return 0.0
     bound = STEEPEST * linear_deflection(scene) ** 2
     plain = _displacement_scene(scene)
@@ -224,7 +225,8 @@ def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> tuple[floa
     reduced body, by default on a coarse mesh.
     """
     h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
-    coarse = prepared or prepare(scene.body, scene.probe_points, h=h, load=scene.load.moving)
+    moving = replace(scene, load=scene.load.moving)
+    coarse = prepared or prepare(moving, SolveOptions(h=h))
     values = coarse.poles.values * (1 - DETUNING)
     frequencies, forces = reduced_forces(coarse, *scene.loads)
     duration = min(scene.tacton.duration, SENSITIVITY_DURATION)

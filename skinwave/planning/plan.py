@@ -47,10 +47,16 @@ class _Request:
     grid: Grid
     model: Model
     reason: str = REQUESTED
+    start: float | None = None  # error of the start that the model leaves out, if known
 
     @property
     def tolerance(self) -> float:
         return self.options.tolerance
+
+    def start_error(self) -> float:
+        """Return the error of the start that the model leaves out."""
+        known = self.start
+        return left_out.start_error(self.scene, self.model, self.grid) if known is None else known
 
     def model_row(self, start: float = 0.0, method: str = "") -> PlanRow:
         """Return the row of the model, with the relative error of the start if it is left out."""
@@ -105,8 +111,8 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
 
 
 def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
-    """Check the request, and return it with the requested or a chosen model."""
-    requested = None if options.model == "auto" else named(options.model)
+    """Check the request and return it with its model, or the one chosen for the scene."""
+    requested, start = None if options.model == "auto" else named(options.model), None
     if options.dt is not None:
         step_count(float(sample_times(scene)[-1]), options.dt)
     if requested:
@@ -119,25 +125,24 @@ def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
         model = requested or SAME_LOAD
     elif requested:
         model, reason = requested, REQUESTED
-    elif options.h is not None and scene.body.of_kind.is_plate and takes(FEM, scene):
-        model, reason = FEM, _why_elements(scene)
     else:
-        model, reason = _cheapest(scene, options.tolerance, grid)
+        model, reason = model_from_rest(scene, options)
         options = options if model is FEM else replace(options, h=None)
-    return _Request(scene=scene, options=options, grid=grid, model=model, reason=reason)
+        start = _steady_start(scene, options.tolerance, grid) if model is FLAT_BODY else None
+        model = model if start is None else HARMONIC
+    return _Request(
+        scene=scene, options=options, grid=grid, model=model, reason=reason, start=start
+    )
 
 
-def chosen_model(scene: Scene, tolerance: float = 0.05, grid: Grid | None = None) -> str:
-    """Return the name of the cheapest model within the tolerance, for the times of a `sample_grid`,
-    by default those of the scene. Raises a ValueError if no model takes the scene.
+def model_from_rest(scene: Scene, options: SolveOptions = DEFAULT) -> tuple[Model, str]:
+    """Return the cheapest model from rest of a body within the tolerance, and the reason for it.
+
+    Of a sheet, a given h selects elements. Raises a ValueError if no model takes the scene.
     """
-    if not scene.body.of_kind.discretise:
-        return SAME_LOAD.name
-    return _cheapest(scene, tolerance, grid or sample_grid(scene))[0].name
-
-
-def _cheapest(scene: Scene, tolerance: float, grid: Grid) -> tuple[Model, str]:
-    """Return the cheapest model of a body within the tolerance, and the reason for it."""
+    tolerance = options.tolerance
+    if options.h is not None and scene.body.of_kind.is_plate and takes(FEM, scene):
+        return FEM, _why_elements(scene)
     if left_out.beyond_linear(scene, tolerance):
         stretching = left_out.stretching_error(scene, FROM_REST, tolerance)
         return STRETCHED, (
@@ -146,19 +151,37 @@ def _cheapest(scene: Scene, tolerance: float, grid: Grid) -> tuple[Model, str]:
         )
     reflections = _reflections(scene)
     if reflections <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene):
-        reason = f"reflections from the sides are only {percent(reflections)}"
         if scene.body.sides == "absorbing":
-            reason = "flat layers with absorbing sides, which need no mesh"
-        try:  # lines are reflected, the start is the body's own vibration: their powers add
-            start = left_out.start_error(scene, HARMONIC, grid)
-        except (ValueError, ArithmeticError):  # no steady state
-            return FLAT_BODY, reason
-        return HARMONIC if np.hypot(reflections, start) <= tolerance else FLAT_BODY, reason
+            return FLAT_BODY, "flat layers with absorbing sides, which need no mesh"
+        return FLAT_BODY, f"reflections from the sides are only {percent(reflections)}"
     if reason := why_modes(scene, tolerance):
         return FROM_REST, reason
     model = named(default_model(scene))
     why_not_elements = "" if model is FEM else f"{FEM.name} {beyond(FEM, scene)[0].why}"
     return model, why_not_elements or _why_elements(scene)
+
+
+def chosen_model(scene: Scene) -> str:
+    """Return the name of the cheapest model of a scene. Raises a ValueError if none takes it."""
+    if not scene.body.of_kind.discretise:
+        return SAME_LOAD.name
+    model, _ = model_from_rest(scene)
+    has_start = model is not FLAT_BODY or (
+        _steady_start(scene, DEFAULT.tolerance, sample_grid(scene)) is None
+    )
+    return model.name if has_start else HARMONIC.name
+
+
+def _steady_start(scene: Scene, tolerance: float, grid: Grid) -> float | None:
+    """Return the error of the steady state of a flat body by its start; None if it has no steady
+    state within the tolerance.
+    """
+    try:
+        start = left_out.start_error(scene, HARMONIC, grid)
+    except (ValueError, ArithmeticError):  # no steady state
+        return None
+    # Lines are reflected, and the start is the body's own vibration: their powers add.
+    return start if np.hypot(_reflections(scene), start) <= tolerance else None
 
 
 def why_modes(scene: Scene, tolerance: float) -> str:
@@ -215,7 +238,7 @@ def _plan_known_error(request: _Request) -> Plan:
     scene, model, options = request.scene, request.model, request.options
     is_auto_modes = model is FROM_REST and options.model == "auto"
     highest, line_row = _highest_line(scene, request.tolerance) if is_auto_modes else (0.0, None)
-    start = left_out.start_error(scene, model, request.grid)
+    start = request.start_error()
     rows, size = [request.model_row(start, model.method)], None
     source = f"the {model.method}"
     cure = "use a larger tolerance" if model.needs_body else "use a model with waves"
@@ -244,11 +267,12 @@ def _plan_wavenumber_integral(request: _Request) -> Plan:
     """Plan a wavenumber integral, which leaves out reflections from the sides."""
     scene, model, tolerance = request.scene, request.model, request.tolerance
     highest, line_row = _highest_line(scene, tolerance)
-    start, others = left_out.start_error(scene, model, request.grid), takers(scene)
+    start, reflections = request.start_error(), _reflections(scene)
+    others = takers(scene) if reflections > tolerance else []
     parts = [
         ErrorPart(
             source=f"reflections from the sides, which {model.name} leaves out",
-            error=_reflections(scene),
+            error=reflections,
             cure=f"use --model {others[0]}" if others else "use absorbing sides",
         ),
         errors.start_part(model, start),

@@ -7,7 +7,7 @@ size. All axes are refined alike, because a slab has few layers of cells and one
 the result as much as the refinement along the surface.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import fft
@@ -86,14 +86,10 @@ def refine(
 
     Raises a ValueError if the body has no mesh of that size.
     """
-    h, tolerance = options.h, options.tolerance
+    h, tolerance, meshed = options.h, options.tolerance, replace(scene, body=body)
 
     def solve(size: float) -> tuple[ReducedBody, Array]:
-        prepared = reduced.prepare(
-            body, scene.probe_points, options.progress, h=size,
-            tolerance=reduced.reduction_tolerance(tolerance), symmetry=symmetry,
-            solver=options.solver, reading=scene.reading, load=scene.load,
-        )  # fmt: skip
+        prepared = reduced.prepare(meshed, replace(options, h=size), symmetry=symmetry)
         return prepared, quantity_of_interest(prepared, scene, reduced.answer(prepared, scene))
 
     check_mesh(body, h or default_size(body))

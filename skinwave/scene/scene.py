@@ -33,14 +33,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
-    "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "SURFACE",
+    "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "STILL", "SURFACE",
     "Body", "Layer", "Load", "Mounting", "Phalanx", "Placement", "Reading", "Relief", "Scene",
     "Sides",
-    "body_name", "check_motion", "kind_of", "solid_of", "with_body",
+    "body_name", "check_motion", "kind_of", "solid_of", "with_body", "without_tacton",
 ]  # fmt: skip
 
 SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest relevant line
 MOST_VALUES = 50_000_000  # of all waveforms of one response, 400 MB
+STILL = MovingPressure(tacton=Tacton())
 PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
 
 
@@ -259,6 +260,11 @@ def check_load(scene: Scene, command: str) -> None:
             f"{command} needs the pressure of a focus, not {scene.load.words}; remove [load], or "
             "use skinwave run or sweep"
         )
+
+
+def without_tacton(scene: Scene) -> Scene:
+    """Return the scene under a pressure at rest: what the reduction of its body depends on."""
+    return replace(scene, name="", pressure=STILL, spreads=())
 
 
 def with_body(scene: Scene, body: Body, **pressure: Any) -> Scene:

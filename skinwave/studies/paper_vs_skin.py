@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, resolved_lines
+from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.models.reduced import answer, prepare
 from skinwave.planning.simulate import compute
@@ -21,7 +22,7 @@ from skinwave.report.figures import png
 from skinwave.report.palette import colour, label, marker
 from skinwave.results.run import ASSESSED
 from skinwave.scene.paper15 import MEASURED_ON, tactons
-from skinwave.scene.scene import BODIES, PROBES, Body, Scene
+from skinwave.scene.scene import BODIES, STILL, Body, Scene
 from skinwave.system.document import Details, Picture, Report
 from skinwave.system.effort import Progress
 from skinwave.system.table import Column, Table
@@ -99,7 +100,8 @@ def _mechanisms(body: Body, h: float | None, progress: Progress) -> Mapping[str,
         return partial(_steady_half, solve, body, drive)
 
     if not body.of_kind.is_plate:
-        linear = partial(answer, prepare(body, np.array(PROBES), progress, h=h))
+        still = Scene(pressure=STILL, body=body)
+        linear = partial(answer, prepare(still, SolveOptions(h=h, progress=progress)))
         return {
             "linear load": by(linear, "linear"),
             "squared load": by(linear, "pressure_squared"),

@@ -206,10 +206,8 @@ def _runs(
     for k, (name, column, scene) in enumerate(every):
         if column in reduced:
             if column not in prepared:
-                prepared[column] = prepare(
-                    scene.body, scene.probe_points, partial(_report, progress, column),
-                    h=options.h, solver=options.solver, reading=scene.reading,
-                )  # fmt: skip
+                reporting = replace(options, progress=partial(_report, progress, column))
+                prepared[column] = prepare(scene, reporting)
             response, body = answer(prepared[column], scene), prepared[column]
             compared = coarser[scene.body].result()
             response = assess(scene, response, body, options, compared=compared)

@@ -16,13 +16,13 @@ from matplotlib.figure import Figure
 from simple_model import Response
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named, names
-from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.limits import takes
 from skinwave.models.linear_elements import FEM
+from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.models.plate_modes import MODES as PLATES
-from skinwave.models.reduced import REDUCTION_TOLERANCE, answer, prepare
-from skinwave.planning.estimates import has_wavenumber_solution
+from skinwave.models.reduced import answer, prepare
 from skinwave.planning.left_out import beyond_linear
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import legend, png
@@ -111,8 +111,7 @@ def candidates(scene: Scene) -> list[Candidate]:
     h = default_size(scene.body)
     sizes = [round(h * factor, 6) for factor in REFINEMENTS]
     every = [Candidate(model="point-kernel")]
-    if has_wavenumber_solution(scene):
-        every += [Candidate(model=f"flat-body{ending}") for ending in ("-harmonic", "")]
+    every += [Candidate(model=each.name) for each in (HARMONIC, FLAT_BODY) if takes(each, scene)]
     if takes(STRETCHED, scene):
         every += [Candidate(model=each.name) for each in (PLATES, FROM_REST)]
         every += [Candidate(model=STRETCHED.name, tolerance=t) for t in TOLERANCES]
@@ -162,10 +161,8 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
     os.environ["SKINWAVE_CACHE"] = ""  # no cache
     started = time.perf_counter()
     if named(candidate.model).is_reduced:
-        prepared = prepare(
-            scene.body, scene.probe_points, h=candidate.h, reading=scene.reading,
-            tolerance=candidate.tolerance or REDUCTION_TOLERANCE,
-        )  # fmt: skip
+        size = SolveOptions(h=candidate.h)
+        prepared = prepare(scene, size, reduction=candidate.tolerance)
         response, ready = answer(prepared, scene), time.perf_counter()
         answer(prepared, scene)
         return response, ready - started, time.perf_counter() - ready, peak_memory()

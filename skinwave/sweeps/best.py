@@ -121,7 +121,7 @@ def find_best(
     )  # fmt: skip
     points = [point for point in sweep.points([{key: x} for x in values]) if point.scene]
     scenes = [point.scene for point in points if point.scene]
-    models = [model_of(scene, sweep.options.model) for scene in scenes]
+    models = [model_of(scene, sweep.options) for scene in scenes]
     # If the motion is proportional to the pressure, this does not change the best value.
     fixed = {key, PRESSURE} if all(map(is_linear, scenes, models)) else {key}
     spreads: list[Spread] = [

@@ -27,7 +27,7 @@ from skinwave.models.flat_body import HARMONIC
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.parametric import lines_of
-from skinwave.models.reduced import components, prepare, reduction_tolerance
+from skinwave.models.reduced import components, prepare
 from skinwave.planning.simulate import compute
 from skinwave.report.styles import SHOWN
 from skinwave.results.surface import LOWEST_LEVEL, REACH, grid, has_wavenumber_integral
@@ -316,11 +316,7 @@ def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solu
         f, a = lines_of(cached_shared_body(family, size, how.tolerance, how.solver), scene.body)
         a = a * (scene.pressure.peak_pressure / family.scene.pressure.peak_pressure)
     elif family:
-        own = prepare(
-            scene.body, scene.probe_points, h=how.h, solver=how.solver,
-            tolerance=reduction_tolerance(how.tolerance), reading=scene.reading, load=scene.load,
-        )  # fmt: skip
-        motion = components(own, *scene.loads)
+        motion = components(prepare(scene, how), *scene.loads)
         f, a = motion.frequencies, motion.lines
     else:
         return _compute(scene, method)

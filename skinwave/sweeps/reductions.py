@@ -13,17 +13,16 @@ from typing import Any
 import numpy as np
 
 from simple_model import Response, named_lines
-from skinwave.bodies.analytic import is_flat_layer, is_laterally_infinite
 from skinwave.models import named, parametric
 from skinwave.models.covering import Covering, cached_shared_body, covering
-from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.free_keys import FreeKey, free_keys, with_values
-from skinwave.models.limits import default_model, takes
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import ReducedBody, answer, prepare, reduction_tolerance
+from skinwave.models.point_kernel import SAME_LOAD
+from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.planning.assessment import assess
+from skinwave.planning.plan import model_from_rest
 from skinwave.planning.refinement import comparison_size, refine
-from skinwave.scene.scene import Body, Load, Reading, Scene
+from skinwave.scene.scene import Body, Scene, without_tacton
 from skinwave.scene.variation import DesignPoint
 from skinwave.system.effort import Progress
 
@@ -32,11 +31,10 @@ CACHED = 4  # bodies that a worker caches in memory, on two meshes each
 NEGLIGIBLE_LINE = 1e-2  # of the strongest line of a load: weaker ones need no finer mesh
 ROUND_OFF = 1e-9  # of a length
 
-# The subject of a reduction: a body, its probes, their reading, and its load.
-Subject = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
 Values = tuple[tuple[str, float], ...]  # of free keys
-Families = list[tuple[Covering, dict[Subject, Values]]]  # each with the values of its bodies
-Limits = Mapping[str, tuple[float, float]]  # lowest and highest value by key
+# Each with the values of its bodies. A body is a scene `without_tacton`.
+Families = list[tuple[Covering, dict[Scene, Values]]]
+Limits = Mapping[str, tuple[float, float]]  # least and largest value by key
 Distribute = Callable[[Callable[[Any], Any], Sequence[Any], Callable[[int, Any], None]], None]
 
 
@@ -59,35 +57,24 @@ class Mesh:
 KILLED = Mesh(error="each worker was killed; provide more memory, or use larger elements")
 
 
-def model_of(scene: Scene, model: str) -> str:
-    """Return the model of a scene; for "auto" the cheapest that includes all of its physics.
-
-    That is the point kernel without a body, the wavenumber integral for a flat body whose sides
-    reflect nothing, and otherwise finite elements.
-    """
-    if model != "auto":
-        return model
-    if not scene.body.of_kind.discretise:
-        return "point-kernel"
-    is_exact = is_flat_layer(scene.body) and is_laterally_infinite(scene.body)
-    return FLAT_BODY.name if is_exact and takes(FLAT_BODY, scene) else default_model(scene)
+def model_of(scene: Scene, options: SolveOptions) -> str:
+    """Return the model from rest of a scene, for "auto" that of its plan."""
+    if options.model != "auto":
+        return options.model
+    moves = scene.body.of_kind.discretise
+    return model_from_rest(scene, options)[0].name if moves else SAME_LOAD.name
 
 
-def subject_of_run(point: DesignPoint, options: SolveOptions) -> Subject | None:
-    """Return what a run's reduction depends on; None if its model needs no reduction."""
+def reduced_scene(point: DesignPoint, options: SolveOptions) -> Scene | None:
+    """Return the scene of a run `without_tacton`, or None if its model reduces no body."""
     scene = point.scene
     if (
         scene is None
-        or not named(model_of(scene, options.model)).is_reduced
+        or not named(model_of(scene, options)).is_reduced
         or not scene.body.of_kind.discretise
     ):
         return None
-    return subject_of(scene)
-
-
-def subject_of(scene: Scene) -> Subject:
-    """Return what the reduction of a scene's body depends on."""
-    return scene.body, scene.probes, scene.reading, scene.load
+    return without_tacton(scene)
 
 
 def shared_meshes(
@@ -96,15 +83,15 @@ def shared_meshes(
     count: int,
     distribute: Distribute,
     progress: Progress,
-) -> dict[Subject, Mesh]:
+) -> dict[Scene, Mesh]:
     """Reduce each body of the runs once, families of bodies together, and return their meshes.
 
     `distribute` calls a function of items on `count` workers.
     """
     progress("reduce bodies", 0.0)
-    hardest: dict[Subject, DesignPoint] = {}
+    hardest: dict[Scene, DesignPoint] = {}
     for point in sorted(runs, key=_highest_line, reverse=True):
-        if subject := subject_of_run(point, options):
+        if subject := reduced_scene(point, options):
             hardest.setdefault(subject, point)
 
     def meshes_of(work: Callable[..., Mesh], items: Sequence[Any]) -> list[Mesh]:
@@ -159,9 +146,9 @@ def mesh_of_body(options: SolveOptions, scene: Scene) -> Mesh:
         pair = refine(scene, scene.body, options)
         return Mesh(h=pair.h, coarser=pair.compared)
     # Raises the error of the given size before that of the coarser mesh.
-    _reduce_twice(subject_of(scene), options, Mesh(h=options.h, coarser=options.h))
+    _reduce_twice(scene, options, Mesh(h=options.h, coarser=options.h))
     mesh = Mesh(h=options.h, coarser=comparison_size(scene.body, options.h))
-    _reduce_twice(subject_of(scene), options, mesh)
+    _reduce_twice(scene, options, mesh)
     return mesh
 
 
@@ -184,7 +171,7 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
     """
     if mesh.error:
         raise ValueError(mesh.error)
-    fine, coarse = _reduce_twice(subject_of(scene), options, mesh)
+    fine, coarse = _reduce_twice(scene, options, mesh)
     how = SolveOptions(tolerance=options.tolerance, h=mesh.h, solver=options.solver)
     response = assess(
         scene, answer(fine, scene), fine, how, compared=(mesh.coarser, coarse), meshed=mesh.meshed
@@ -195,8 +182,9 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
     return response, mesh
 
 
-def _reduce_twice(subject: Subject, options: SolveOptions, mesh: Mesh) -> list[ReducedBody]:
+def _reduce_twice(scene: Scene, options: SolveOptions, mesh: Mesh) -> list[ReducedBody]:
     """Return the reduced body on both meshes."""
+    subject = without_tacton(scene)
     return [
         prepare_body(subject, h, options.tolerance, options.solver, mesh.family, mesh.values)
         for h in (mesh.h, mesh.coarser)
@@ -205,22 +193,15 @@ def _reduce_twice(subject: Subject, options: SolveOptions, mesh: Mesh) -> list[R
 
 @lru_cache(maxsize=2 * CACHED)
 def prepare_body(
-    subject: Subject, h: float, tolerance: float, solver: str,
-    family: Covering | None, values: Values,
-) -> ReducedBody:  # fmt: skip
+    subject: Scene, h: float, tolerance: float, solver: str, family: Covering | None, values: Values
+) -> ReducedBody:
     """Return a reduced body with elements of h in m; in a family, the one with these values."""
     if family:
         return parametric.at(cached_shared_body(family, h, tolerance, solver), dict(values))
-    body, probes, reading, load = subject
-    return prepare(
-        body, np.array(probes), h=h, solver=solver, tolerance=reduction_tolerance(tolerance),
-        reading=reading, load=load,
-    )  # fmt: skip
+    return prepare(subject, SolveOptions(h=h, tolerance=tolerance, solver=solver))
 
 
-def families(
-    hardest: Mapping[Subject, DesignPoint], tolerance: float, workers: int = 1
-) -> Families:
+def families(hardest: Mapping[Scene, DesignPoint], tolerance: float, workers: int = 1) -> Families:
     """Group bodies into families, given the run with the highest line of each body.
 
     A family has many thicknesses if this saves time, otherwise one.
@@ -230,12 +211,13 @@ def families(
         shared = {subject for _, members in found for subject in members}
         remaining = {subject: point for subject, point in hardest.items() if subject not in shared}
         limits = _limits(remaining.values())
-        groups: dict[tuple[Any, ...], dict[Subject, DesignPoint]] = {}
+        groups: dict[tuple[Any, ...], dict[Scene, DesignPoint]] = {}
         for subject, point in remaining.items():
-            if keys := _free_keys_of(subject[0], point, limits, moving=moving):
+            if keys := _free_keys_of(subject.body, point, limits, moving=moving):
                 assert point.before
                 rest = with_values(point.before.body, keys, {key.key: key.low for key in keys})
-                groups.setdefault((keys, rest, *subject[1:]), {})[subject] = point
+                kind = keys, rest, subject.probes, subject.reading, subject.load
+                groups.setdefault(kind, {})[subject] = point
         for (keys, *_), members in groups.items():
             if len(members) >= PER_WORKER * workers:
                 found += _family(members, keys, tolerance)
@@ -280,7 +262,7 @@ def _free_keys_of(
 
 
 def _family(
-    members: Mapping[Subject, DesignPoint], keys: Sequence[FreeKey], tolerance: float
+    members: Mapping[Scene, DesignPoint], keys: Sequence[FreeKey], tolerance: float
 ) -> Families:
     """Return the family of bodies that differ in keys, if they can be reduced together."""
     limits = _limits(members.values())

@@ -21,12 +21,11 @@ from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import input_columns, result_columns
 from skinwave.sweeps.reductions import (
     Mesh,
-    Subject,
     error_text,
     model_of,
     on_mesh,
+    reduced_scene,
     shared_meshes,
-    subject_of_run,
 )
 from skinwave.system.effort import Progress, silent
 
@@ -143,16 +142,16 @@ class Sweep:
         )  # fmt: skip
 
     def _batches(
-        self, runs: Mapping[str, DesignPoint], meshes: Mapping[Subject, Mesh], count: int
+        self, runs: Mapping[str, DesignPoint], meshes: Mapping[Scene, Mesh], count: int
     ) -> list[tuple[dict[str, DesignPoint], Mesh | None]]:
-        """Group runs on the same body, and short runs."""
-        groups: dict[Subject | None, list[str]] = {}
+        """Group runs on one body, and other runs if they are short."""
+        groups: dict[Scene | None, list[str]] = {}
         for name, point in runs.items():
-            groups.setdefault(subject_of_run(point, self.options), []).append(name)
+            groups.setdefault(reduced_scene(point, self.options), []).append(name)
         # Several batches for each worker, so that none waits long for the last.
         size = max(1, min(BATCH, len(runs) // (4 * count)))
         return [
-            ({n: runs[n] for n in members[k : k + step]}, solid and meshes[solid])
+            ({n: runs[n] for n in members[k : k + step]}, meshes[solid] if solid else None)
             for solid, members in groups.items()
             for step in [size if solid or not self.assessed else 1]
             for k in range(0, len(members), step)
@@ -189,7 +188,7 @@ def _row(
 
 def _alone(scene: Scene, options: SolveOptions, assessed: bool) -> Response:
     """Return the response of a run without a shared reduction."""
-    model = model_of(scene, options.model)
+    model = model_of(scene, options)
     if assessed or named(model).default_size is not None:
         own = SolveOptions(
             model=model, tolerance=options.tolerance, h=options.h, solver=options.solver

@@ -10,8 +10,9 @@ import fem
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
 from simple_model.load.focus import spot_width
 from skinwave.bodies.build import Build, build, operators
+from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare
-from skinwave.scene.scene import Body, Scene
+from skinwave.scene.scene import STILL, Body, Scene
 from skinwave.typing import Floats
 from skinwave.verify.case import Checks, below, case, relative
 from skinwave.verify.setups import push, read
@@ -106,7 +107,8 @@ def durations() -> Checks:
 
 @cache
 def _prepare() -> ReducedBody:
-    return prepare(BODY, np.array(PROBES), h=H, tolerance=1e-4)
+    still = Scene(pressure=STILL, body=BODY, probes=PROBES)
+    return prepare(still, SolveOptions(h=H), reduction=1e-4)
 
 
 @cache

@@ -8,9 +8,13 @@ import pytest
 
 import skinwave
 from skinwave.commands.cli import main
+from skinwave.models import named
+from skinwave.models.options import SolveOptions
 from skinwave.models.parametric import answer
+from skinwave.planning.plan import chosen_model, model_from_rest
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import loads
+from skinwave.sweeps.reductions import model_of
 
 SCENE = """
 [tacton]
@@ -43,6 +47,25 @@ def test_a_sweep_of_one_scene_is_its_simulation(simulated):
     peaks = 1e6 * np.abs(simulated.values).max(axis=0)
     np.testing.assert_allclose(row["peak_um"], peaks, rtol=1e-6)
     assert row["expected_error"] == pytest.approx(simulated.expected_error, rel=1e-6)
+
+
+@pytest.mark.parametrize("body", ["kind = 'sheet'", "sides = 'clamped'", "kind = 'palm'", ""])
+def test_plan_sweep_and_fit_choose_one_model(body):
+    """A fit and a sweep start from rest; a plan may leave out the start."""
+    scene = loads(f"[tacton]\nam_frequency_hz = 140\nduration_s = 0.05\n[body]\n{body}")
+    planned = named(chosen_model(scene))
+    assert model_of(scene, SolveOptions()) == (planned.from_rest or planned.name)
+    assert model_from_rest(scene)[0].name == (planned.from_rest or planned.name)
+
+
+def test_a_sheet_that_stretches_stretches_in_a_sweep():
+    """A linear sheet would deflect six times as much."""
+    scene = loads("[tacton]\nam_frequency_hz = 140\nduration_s = 0.03\n[body]\nkind = 'sheet'")
+    (row,) = skinwave.sweep(scene, {AM: [140.0]}, workers=1).rows
+    stretched = compute(scene, "plate-modes-nonlinear").values
+    settled = stretched[len(stretched) // 4 :]
+    np.testing.assert_allclose(row["peak_um"], 1e6 * np.abs(settled).max(axis=0), rtol=0.05)
+    assert row["expected_error"] < 0.05
 
 
 def test_a_body_with_a_free_modulus_is_that_of_its_own_value():

@@ -76,7 +76,7 @@ def test_a_quarter_in_air_moves_like_the_whole():
     still = replace(LOAD, tacton=replace(LOAD.tacton, trajectory=Trajectory()))
     scene = replace(SCENE, pressure=still)
     whole, part = (
-        answer(prepare(SHEET, scene.probe_points, h=H, symmetry=axes), scene).displacement
+        answer(prepare(scene, SolveOptions(h=H), symmetry=axes), scene).displacement
         for axes in ("", "xy")
     )
     assert np.linalg.norm(part - whole) < 2e-3 * np.linalg.norm(whole)
@@ -88,7 +88,7 @@ def test_small_motion_of_a_stretching_sheet_is_linear():
     tacton = replace(LOAD.tacton, duration=0.4, am_frequency=60.0)
     scene = replace(SCENE, pressure=replace(LOAD, peak_pressure=1e-3, tacton=tacton))
     times = np.arange(4000) / 1e4
-    linear = answer(prepare(SHEET, scene.probe_points, h=2e-3), scene).displacement
+    linear = answer(prepare(scene, SolveOptions(h=2e-3)), scene).displacement
     modes = reduced_answer(scene, times, SolveOptions(h=2e-3)).displacement
     settled = slice(3000, None)
     a, b = (u[settled] - u[settled].mean(axis=0) for u in (linear, modes))

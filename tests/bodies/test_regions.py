@@ -16,6 +16,7 @@ from skinwave.bodies.build import build
 from skinwave.models import parametric
 from skinwave.models.free_keys import has_affine_operators, values_at
 from skinwave.models.free_keys import with_values as with_free_values
+from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import components, prepare
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
@@ -109,7 +110,9 @@ def test_materials_of_tissue_and_bone_can_be_varied(body):
         changed = with_free_values(body, free.keys, values)
         assert dict(changed.regions)["bone"].density == values[DENSITY]
         frequencies, found = parametric.lines(free, values)
-        own = components(prepare(changed, scene.probe_points, h=4e-3), scene.pressure)
+        own = components(
+            prepare(replace(scene, body=changed), SolveOptions(h=4e-3)), scene.pressure
+        )
         expected = own.lines[[np.argmin(np.abs(own.frequencies - f)) for f in frequencies]]
         assert line_errors(found, expected).max() < 0.01
         largest.append(np.abs(found).max())

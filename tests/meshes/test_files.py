@@ -17,8 +17,9 @@ from meshes.files.mesh_files import read_contents
 from meshes.surface.repair import check
 from meshes.surface.triangulation import volume
 from skinwave.commands.cli import main
+from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import prepare
-from skinwave.scene.scene import Body
+from skinwave.scene.scene import STILL, Body, Scene
 
 pytestmark = pytest.mark.usefixtures("read_here")
 HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
@@ -593,12 +594,12 @@ def test_options_of_the_mesh_command(tmp_path, capsys):
 def test_the_cache_distinguishes_facet_sets_of_a_file(tmp_path):
     block = meshes.block((0.02, 0.02, 0.01), 0.005)
     body = Body(kind="mesh", file=str(tmp_path / "body.vtu"), sides="clamped")
-    read = []
+    scene, read = Scene(pressure=STILL, body=body, probes=((-0.004, 0.001),)), []
     for held, pushed in (("sides", "top"), ("left", "top"), ("left", "part")):
         part = block.facets["top"][block.points[block.facets["top"]][..., 0].max(axis=1) < 1e-9]
         facets = {"sides": block.facets[held], "top": {**block.facets, "part": part}[pushed]}
         meshes.write(body.file, replace(block, facets=facets))
-        read.append(prepare(body, np.array([(-0.004, 0.001)]), h=0.005))
+        read.append(prepare(scene, SolveOptions(h=0.005)))
     stiffness = [np.abs(prepared.poles.values[:3]).sum() for prepared in read]
     assert stiffness[0] != pytest.approx(stiffness[1], rel=1e-3)
     assert len(read[1].points) == 2 * len(read[2].points)

@@ -1,6 +1,7 @@
 """Reduced bodies in the cache: the same again, and never those of another body."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,14 +21,14 @@ def test_a_prepared_body_comes_from_the_cache_unchanged(tmp_path, monkeypatch):
     monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
     scene = loads(SHORT)
     phases = []
-    arguments = (scene.body, scene.probe_points, lambda phase, _: phases.append(phase))
-    first = answer(prepare(*arguments, h=0.012), scene)
+    options = SolveOptions(h=0.012, progress=lambda phase, _: phases.append(phase))
+    first = answer(prepare(scene, options), scene)
     assert "reduce" in phases
     phases.clear()
-    again = answer(prepare(*arguments, h=0.012), scene)
+    again = answer(prepare(scene, options), scene)
     assert phases == ["mesh"]
     np.testing.assert_array_equal(first.displacement, again.displacement)
-    prepare(*arguments, h=0.008)
+    prepare(scene, replace(options, h=0.008))
     assert "reduce" in phases  # another mesh is another entry
 
 
@@ -49,17 +50,17 @@ def test_the_key_of_a_body_holds_solver_options_and_shapes(tmp_path, monkeypatch
     monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
     scene = loads(SHORT)
 
-    def is_stored(**options):
+    def made(symmetry="", reduction=None, **options):
         before = len(list(tmp_path.glob("*.npz")))
-        prepare(scene.body, scene.probe_points, h=0.01, **options)
+        prepare(scene, SolveOptions(h=0.01, **options), symmetry=symmetry, reduction=reduction)
         return len(list(tmp_path.glob("*.npz"))) > before
 
-    assert is_stored()
-    assert not is_stored(solver=fem.available()[0])  # what auto is
-    assert is_stored(solver="superlu") == (fem.available()[0] != "superlu")
-    assert is_stored(tolerance=5e-3)
-    assert is_stored(symmetry="x")
-    assert not is_stored()
+    assert made()
+    assert not made(solver=fem.available()[0])  # what auto is
+    assert made(solver="superlu") == (fem.available()[0] != "superlu")
+    assert made(reduction=5e-3)
+    assert made(symmetry="x")
+    assert not made()
     x = np.arange(6.0)
     assert len({cache.key(a) for a in (x, x.reshape(2, 3), x.view(np.int64))}) == 3
 

@@ -11,6 +11,7 @@ from skinwave.bodies import Body
 from skinwave.bodies.build import build, operators
 from skinwave.models import meshed, reduced
 from skinwave.models.meshed import axes_of_probes
+from skinwave.models.options import SolveOptions
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import Scene
 
@@ -27,7 +28,7 @@ def motions(monkeypatch, body, probes, h):
     scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=probes), []
     for axes in (axes_of_probes, lambda probes, among: ""):
         monkeypatch.setattr(meshed, "axes_of_probes", axes)
-        made = reduced.prepare(body, scene.probe_points, h=h, tolerance=1e-6)
+        made = reduced.prepare(scene, SolveOptions(h=h), reduction=1e-6)
         found.append(reduced.answer(made, scene))
     return found
 

@@ -234,8 +234,8 @@ def test_a_symmetric_scene_is_halved(path, axes):
     required = plan(scene, SolveOptions(tolerance=0.3, model="fem"))
     assert required.symmetry == axes
     assert required.error <= 0.3
-    whole = answer(prepare(scene.body, scene.probe_points, h=0.008), scene)
-    part = answer(prepare(scene.body, scene.probe_points, h=0.008, symmetry=axes), scene)
+    size = SolveOptions(h=0.008)
+    whole, part = (answer(prepare(scene, size, symmetry=both), scene) for both in ("", axes))
     assert part.effort.dofs <= whole.effort.dofs / 2 ** len(axes) * 1.2
     np.testing.assert_allclose(
         part.displacement, whole.displacement, atol=2e-3 * np.abs(whole.displacement).max()
@@ -247,7 +247,7 @@ def test_meshes_are_refined_until_they_meet_the_tolerance():
     scene = loads(text + "[focus]\npeak_pressure_pa = 0.1\n[probes]\npoints_mm = [[0, 0], [5, 0]]")
     loose, tight = (plan(scene, SolveOptions(tolerance=x, model="fem")) for x in (0.2, 0.04))
     assert tight.h < loose.h
-    finer = answer(prepare(scene.body, scene.probe_points, h=1.6e-3, symmetry="xy"), scene)
+    finer = answer(prepare(scene, SolveOptions(h=1.6e-3), symmetry="xy"), scene)
     for required in (loose, tight):
         misfit = compare(finer, answer(required.prepared, scene)).relative_l2.max()
         assert required.error / 5 < misfit < 2 * required.error

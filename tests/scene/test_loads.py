@@ -16,7 +16,7 @@ from simple_model.layers.wavenumber_integral import point_integrals
 from simple_model.load.spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT
 from simple_model.response import fit_lines
-from skinwave import Body, Load, SupportMotion, dumps, loads
+from skinwave import Body, Load, Scene, SupportMotion, dumps, loads
 from skinwave.bodies.build import build, operators
 from skinwave.measure import Measurement
 from skinwave.measure.fit import fit
@@ -300,8 +300,9 @@ def test_pressure_only_functions_refuse_other_loads():
         write_pattern(scene, ".csv", Options())
     with pytest.raises(ValueError, match="needs a load normal to it"):
         loads(SHEAR + "[body]\npreset = 'paper-sheet-loose'")
-    reduced = prepare(scene.body, scene.probe_points, h=6e-3)
-    assert np.isfinite(answer(reduced, replace(scene, load=Load())).values).all()
+    pressed = replace(scene, load=Load())
+    reduced = prepare(pressed, SolveOptions(h=6e-3))
+    assert np.isfinite(answer(reduced, pressed).values).all()
     with pytest.raises(ValueError, match="is reduced for"):
         answer(reduced, scene)
     shaken = "[load.support_motion]\nfrequency_hz = 100\namplitude_um = 1\n"
@@ -325,7 +326,7 @@ def test_materials_can_be_varied_under_any_moving_load(load):
     free = skinwave.prepare(scene, {MODULUS: (1.5e4, 3e4)}, h=6e-3)
     values = {MODULUS: 2.6e4}
     own = with_values(scene, values)
-    reduced = prepare(own.body, own.probe_points, h=6e-3, load=own.load)
+    reduced = prepare(own, SolveOptions(h=6e-3))
     found, expected = parametric.answer(free, values).values, answer(reduced, own).values
     assert far(found, expected).max() < 0.01
 
@@ -437,15 +438,15 @@ def test_support_motion_adds_to_the_load_and_has_rates():
 
 def test_another_tone_reuses_the_reduction(monkeypatch, tmp_path):
     monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
-    probes = np.zeros((1, 2))
-    first, louder = (
-        prepare(COLUMN, probes, h=6e-3, load=Load(support_motion=each))
-        for each in (UP, replace(UP, frequency=90.0, amplitude=1e-6))
+    another = replace(UP, frequency=90.0, amplitude=1e-6)
+    at_rest = Scene(pressure=MovingPressure(tacton=Tacton()), body=COLUMN, probes=((0.0, 0.0),))
+    first, louder, along = (
+        prepare(replace(at_rest, load=load), SolveOptions(h=6e-3))
+        for load in (Load(support_motion=UP), Load(support_motion=another), Load())
     )
     assert "factorise and reduce" not in louder.effort.seconds
     assert louder.load.support_motion.frequency == 90.0
     np.testing.assert_array_equal(first.inertia, louder.inertia)
-    along = prepare(COLUMN, probes, h=6e-3, load=Load())
     assert "factorise and reduce" in along.effort.seconds
     assert not along.translation.any()
 

@@ -14,7 +14,7 @@ from skinwave.models import covering
 from skinwave.models.free_keys import free_keys, with_values
 from skinwave.models.options import SolveOptions
 from skinwave.scene.file import read, to_table
-from skinwave.scene.scene import BODIES, Body, Layer, Scene
+from skinwave.scene.scene import BODIES, Body, Layer, Scene, without_tacton
 from skinwave.scene.variation import cases_of, combinations, parse
 from skinwave.sweeps import dataset, reductions
 
@@ -70,12 +70,12 @@ def test_the_forearm_deflects_most_near_the_rayleigh_speed(tmp_path, monkeypatch
 
 def test_bodies_are_prepared_once(scene, monkeypatch):
     prepared, inner = [], reductions.prepare
-    counting = lambda *a, **k: prepared.append((a, k)) or inner(*a, **k)  # noqa: E731
+    counting = lambda scene, how: prepared.append((scene, how.h)) or inner(scene, how)  # noqa: E731
     monkeypatch.setattr(reductions, "prepare", counting)
     reductions.prepare_body.cache_clear()
     rows = swept("tacton.speed_m_per_s=2:8:3", "body.thickness_mm=12,13", *ON_SMALL)
     assert {row["status"] for row in rows} == {"done"}
-    assert len(prepared) == len({(a[0], k["h"]) for a, k in prepared}) == 4  # two meshes each
+    assert len(prepared) == len({*prepared}) == 4  # two meshes each
     assert all(row["dofs"] > 500 and row["energy_imbalance"] < 0.01 for row in rows)
 
 
@@ -139,14 +139,14 @@ def families_of(body, *varied, design="factorial"):
     """How many bodies of a sweep share a model, each of which has its own materials."""
     table = to_table(Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=body))
     points = cases_of(table, table, combinations([parse(each) for each in varied], design))
-    hardest = {reductions.subject_of(point.scene): point for point in points}
+    hardest = {without_tacton(point.scene): point for point in points}
     found = reductions.families(hardest, 0.05)
     for family, members in found:
         keys = free_keys(family.scene.body, {k: (a, b) for k, a, b in family.ranges})
-        for (body, *_), values in members.items():
+        for scene, values in members.items():
             own = with_values(family.scene.body, keys, dict(values))
-            assert own.solids == body.solids
-            assert own.depth == pytest.approx(body.depth, rel=1e-9)
+            assert own.solids == scene.body.solids
+            assert own.depth == pytest.approx(scene.body.depth, rel=1e-9)
     assert not reductions.families(hardest, 0.05, workers=len(points))
     return sorted(len(members) for _, members in found)
 
