@@ -7,10 +7,12 @@ import pytest
 from corpus import SHORT
 
 from simple_model import Tacton, Trajectory
+from skinwave.models import named
+from skinwave.models.limits import takes
 from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES, Body
 from skinwave.studies import paper_vs_skin
-from skinwave.studies.tradeoff import Candidate, study, write
+from skinwave.studies.tradeoff import Candidate, candidates, study, write
 
 
 @pytest.mark.slow
@@ -38,6 +40,20 @@ def test_tradeoff_ranks_candidates_by_cost_and_error(tmp_path, monkeypatch):
     assert len(phases) == len(chosen) + 2
     write(tmp_path, scene, found)
     assert (tmp_path / "tradeoff.csv").read_text().count("\n") == 5
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "material = { density_kg_m3 = 1000, shear_modulus_pa = 2e4, poisson = 0.49 }",
+        "kind = 'palm'",
+        "kind = 'sheet'",
+        "kind = 'sheet'\nmaterial = 'paper-grain'\nair = true",
+    ],
+)
+def test_every_candidate_takes_its_scene(body):
+    scene = loads(f"[tacton]\nam_frequency_hz = 140\n[body]\n{body}")
+    assert [c.model for c in candidates(scene) if not takes(named(c.model), scene)] == []
 
 
 def test_tradeoff_needs_a_body():
