@@ -134,7 +134,9 @@ class SumFactoriser:
         return {**vars(self), "_matrix": None}
 
     def __call__(self, weights: Array) -> Factor:
-        """Return the factor of a sum, valid until the next call. Raises as `factorise`."""
+        """Return the factor of a sum, valid until the next call. Raises the errors of
+        `factorise`.
+        """
         values = np.empty(self._values.shape[1], np.complex128)
         values.real, values.imag = weights.real @ self._values, weights.imag @ self._values
         if self._backend not in ("auto", "pardiso") or mkl() is None:

@@ -48,7 +48,7 @@ def read_pattern(
 ) -> tuple[Scene, tuple[str, ...]]:
     """Read a pattern file onto a base scene, and return the scene and notes.
 
-    Without a base, the body is a slab that contains the path. Raises a ValueError as `convert`.
+    Without a base, the body is a slab that contains the path. Raises the errors of `convert`.
     """
     if (suffix := path.suffix.lower()) not in READERS:
         raise ValueError(f"{path}: cannot read '{suffix}'; use {', '.join(READERS)}")

@@ -30,7 +30,7 @@ DURATION, RATE = 0.1, 2500.0  # s and Hz of the estimate of reflections
 
 def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
     """Return frequencies (f,) in Hz of the lines that move the probes, and the share (f, p) of each
-    in the power of the motion, from the wavenumber integral of the infinite body, or in that of the
+    in the power of the motion of the infinite body or, without its wavenumber integral, of the
     load.
     """
     body = scene.body

@@ -160,8 +160,8 @@ def _layered_size(body: Body, layers: int, near: float) -> float:
 
 
 def refinement_ratio(body: Body, other: float, h: float) -> float:
-    """Return the refinement ratio of two meshes: that of their sizes in m or, if smaller, the mean
-    ratio of their cells along all axes, because short sides have few cells.
+    """Return the refinement ratio of two meshes: that of their sizes in m or, if closer to 1, the
+    mean ratio of their cells along all axes, because short sides have few cells.
     """
     if actual := body.of_kind.actual_size:
         return actual(body, other) / actual(body, h)

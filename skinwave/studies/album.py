@@ -84,7 +84,7 @@ class Album:
 
 
 def scene_columns(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
-    """Return a scene by `Run.column`: by both point kernels, on its own body and on other presets.
+    """Return scenes by `Run.column`: of both point kernels, of its own body and of other presets.
 
     A scene without a body is computed on the paper sheet and the skin slab, if its path and probes
     fit. All but the published kernel receive the same load. Raises a ValueError if the load is not

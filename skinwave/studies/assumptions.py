@@ -91,10 +91,11 @@ def side_step(scene: Scene) -> tuple[str, ...]:
 
 
 def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
-    """Whether all assumptions but one can be dropped.
+    """Whether an assumption can be the only one that is made.
 
-    The array's field has no other profile. An infinite body of elements has absorbing sides, which
-    must differ from those of the scene, and needs a constraint elsewhere.
+    The profile cannot if side lobes are among the steps, because the array's field has one profile.
+    An infinite body of elements has absorbing sides, which must differ from those of the scene, and
+    needs a constraint elsewhere.
     """
     if name == "sinc^2 profile":
         return "main lobe only" not in names
