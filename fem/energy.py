@@ -157,8 +157,8 @@ def mechanical_energy(body: Elastic | Operators, state: State) -> float:
 def imbalance(spent: EnergyBalance, stored: float = 0.0) -> float:
     """Return the error of an energy balance relative to its largest part.
 
-    `stored` is the energy in J that the body has gained. Round-off is ignored: of the reactive
-    power, and of tiny numbers.
+    `stored` is the energy in J that the body has gained. Round-off, of tiny numbers or of the
+    reactive power, is ignored.
     """
     size = max(abs(spent.work), abs(stored) + spent.lost, ROUND_OFF * spent.exchanged)
     return abs(spent.work - stored - spent.lost) / size if size > TINY else 0.0

@@ -115,8 +115,8 @@ def relaxed_stress(stress: Floats, dt: float, material: Material) -> Floats:
     """Return the viscoelastic stress (t, ...) in Pa from rest, given the stress by the
     `shear_modulus` alone in steps of dt.
 
-    The material must have no own modulus law. Rates are those of a cubic spline; Maxwell branches
-    are exact for stress that is linear between samples.
+    The material must not have a modulus law of its own. Rates are those of a cubic spline; Maxwell
+    branches are exact for stress that is linear between samples.
     """
     from scipy.interpolate import CubicSpline  # slow to import
     from scipy.signal import lfilter

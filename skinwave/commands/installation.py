@@ -20,7 +20,7 @@ MISSING = "not installed"
 
 def examine() -> list[dict[str, str]]:
     """Return (what, value, cure) of versions, solver, renderer, threads, cache and optional
-    packages; the cure is empty if nothing can be improved.
+    packages; the cure is empty if none is needed.
     """
     drawing, solvers, home = renderer(), fem.available(), cache.folder()
     limits = ", ".join(f"{name}={os.environ[name]}" for name in THREADS if name in os.environ)

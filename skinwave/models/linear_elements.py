@@ -185,8 +185,8 @@ def march(
     stored: Callable[[fem.State], float],
     report: Progress,
 ) -> tuple[Floats, tuple[float, float]]:
-    """Return the readings (steps + 1, p) of displacements (3 n,) in m in a time integration, and
-    its last `energy_balance`, with the energy in J that is `stored` in a state.
+    """Return readings (steps + 1, p) of the displacements (3 n,) in m of a time integration, and
+    its last `energy_balance`; `stored` returns the energy in J of a state.
 
     Raises `fem.Diverged` if a checked state violates the balance.
     """

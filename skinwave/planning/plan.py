@@ -138,7 +138,7 @@ def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
 def model_from_rest(scene: Scene, options: SolveOptions = DEFAULT) -> tuple[Model, str]:
     """Return the cheapest model from rest of a body within the tolerance, and the reason for it.
 
-    Of a sheet, a given h selects elements. Raises a ValueError if no model takes the scene.
+    For a sheet, a given h selects elements. Raises a ValueError if no model takes the scene.
     """
     tolerance = options.tolerance
     if options.h is not None and scene.body.of_kind.is_plate and takes(FEM, scene):

@@ -104,7 +104,7 @@ def line_symbol(name: str) -> str:
 def name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int = 1) -> None:
     """Write names of lines above a panel that is `width` points wide, in a few rows.
 
-    `lines` are frequencies in Hz by name. Those with room are named and marked, first ones first.
+    `lines` are frequencies in Hz by name. The first lines that have room are named and marked.
     """
     size, occupied = small(), [list[tuple[float, float]]() for _ in range(rows)]
     to_axes = ax.transScale + ax.transLimits
