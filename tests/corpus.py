@@ -9,6 +9,8 @@ import numpy as np
 import fem
 import meshes
 from meshes import TetMesh
+from simple_model import Material, MovingPressure, Tacton
+from skinwave.scene.scene import Body, Scene
 
 SEED = 1404
 GOOD = """
@@ -52,20 +54,12 @@ size_y_mm = 60
 [probes]
 points_mm = [[0, 0], [5, 0]]
 """
-FREE = """
-[tacton]
-am_frequency_hz = 226
-duration_s = 0.09
-[body]
-size_x_mm = 29.3
-size_y_mm = 20
-thickness_mm = 9.9
-base = "free"
-sides = "clamped"
-material = {density_kg_m3 = 1000, shear_modulus_pa = 30100, poisson = 0.4999, viscosity_pa_s = 4.3}
-[probes]
-points_mm = [[-5.3, 8.7], [-0.5, -1.1], [-7.7, -1.3]]
-"""
+SOFT = Material(density=1000, shear_modulus=30100, poisson=0.4999, viscosity=4.3)
+FREE = Scene(
+    pressure=MovingPressure(tacton=Tacton(am_frequency=226, duration=0.09)),
+    body=Body(width=0.0293, height=0.02, depth=0.0099, base="free", sides="clamped", material=SOFT),
+    probes=((-5.3e-3, 8.7e-3), (-0.5e-3, -1.1e-3), (-7.7e-3, -1.3e-3)),
+)
 
 NUMBERS = {
     "tacton": ("amplitude_percent", "am_frequency_hz", "second_am_frequency_hz",

@@ -7,30 +7,23 @@ import numpy as np
 import pytest
 
 import skinwave
+from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.commands.cli import main
 from skinwave.models import named
 from skinwave.models.options import SolveOptions
 from skinwave.models.parametric import answer
 from skinwave.planning.plan import chosen_model, model_from_rest
 from skinwave.planning.simulate import compute
-from skinwave.scene.file import loads
+from skinwave.scene.file import dumps, loads
+from skinwave.scene.scene import Body, Scene
 from skinwave.sweeps.reductions import model_of
 
-SCENE = """
-[tacton]
-am_frequency_hz = 140
-duration_s = 0.05
-shape = "circle"
-size_mm = 8
-speed_m_per_s = 5
-[body]
-size_x_mm = 16
-size_y_mm = 16
-thickness_mm = 5
-sides = "clamped"
-[probes]
-points_mm = [[0, 0], [4, 0]]
-"""
+PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
+SCENE = Scene(
+    pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05, trajectory=PATH)),
+    body=Body(width=0.016, height=0.016, depth=0.005, sides="clamped"),
+    probes=((0.0, 0.0), (0.004, 0.0)),
+)
 SIZE = 2e-3  # metre
 AM = "tacton.am_frequency_hz"
 MODULUS = "body.material.shear_modulus_pa"
@@ -38,11 +31,11 @@ MODULUS = "body.material.shear_modulus_pa"
 
 @pytest.fixture(scope="module")
 def simulated():
-    return skinwave.simulate(loads(SCENE), "fem", h=SIZE)
+    return skinwave.simulate(SCENE, "fem", h=SIZE)
 
 
 def test_a_sweep_of_one_scene_is_its_simulation(simulated):
-    table = skinwave.sweep(loads(SCENE), {AM: [140.0]}, model="fem", h=SIZE, workers=1)
+    table = skinwave.sweep(SCENE, {AM: [140.0]}, model="fem", h=SIZE, workers=1)
     (row,) = table.rows
     peaks = 1e6 * np.abs(simulated.values).max(axis=0)
     np.testing.assert_allclose(row["peak_um"], peaks, rtol=1e-6)
@@ -69,16 +62,15 @@ def test_a_sheet_that_stretches_stretches_in_a_sweep():
 
 
 def test_a_body_with_a_free_modulus_is_that_of_its_own_value():
-    scene = loads(SCENE)
-    own = compute(scene, "fem", tolerance=1e-4, h=SIZE)
-    body = skinwave.prepare(scene, {MODULUS: (1e4, 5e4)}, tolerance=1e-6, h=SIZE)
-    found = answer(body, {MODULUS: scene.body.solid.shear_modulus})
+    own = compute(SCENE, "fem", tolerance=1e-4, h=SIZE)
+    body = skinwave.prepare(SCENE, {MODULUS: (1e4, 5e4)}, tolerance=1e-6, h=SIZE)
+    found = answer(body, {MODULUS: SCENE.body.solid.shear_modulus})
     np.testing.assert_allclose(found.values, own.values, atol=2e-6 * np.abs(own.values).max())
 
 
 def test_commands_write_what_python_returns(simulated, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("scene.toml").write_text(SCENE)
+    Path("scene.toml").write_text(dumps(SCENE))
     size = ["--element-size", "2", "--quiet"]
     assert main(["run", "scene.toml", "--model", "fem", *size, "--out", "run"]) == 0
     with np.load("run/responses.npz") as arrays:

@@ -66,7 +66,7 @@ def test_the_key_of_a_body_holds_solver_options_and_shapes(tmp_path, monkeypatch
 
 
 def test_a_plan_is_the_same_again_with_and_without_a_cache(monkeypatch, tmp_path):
-    scene, found = loads(FREE), []
+    scene, found = FREE, []
     for folder in ("one", "one", ""):
         monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / folder) if folder else "")
         found.append(solve(scene, plan(scene, SolveOptions(tolerance=0.2))))

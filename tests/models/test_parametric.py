@@ -1,5 +1,6 @@
 """One reduced body, or sheet, for every material of a range, against each one's own bodies."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 import fem
 import skinwave
-from fem.affine import Solids, assemble_affine, operators_of, weights
+from fem.affine import Solids, assemble_affine, line_solution, operators_of, weights
 from fem.affine_model import AffineModel, line_errors
 from fem.greedy import line_bases
 from fem.harmonic import dynamic_stiffness
@@ -274,6 +275,23 @@ def test_the_waveform_from_rest_is_that_of_the_sheets_own_body_and_balances_ener
     both = parametric.at(prepared_sheet, values), own
     free = [np.abs(each.poles.values).min() for each in both]
     assert free[0] == pytest.approx(free[1], rel=1e-4)
+
+
+def test_a_line_of_the_full_body_in_air_is_that_of_dense_matrices(monkeypatch):
+    made = build(SHEET, 1.5e-2)
+    affine = free_bodies.affine_operators(SHEET, made)
+    (of_line,) = weights(affine.terms, Solids(materials=tuple(made.material.values())), [180.0])
+    every = np.eye(len(affine.free))
+    A = sum(w * (part @ every) for w, part in zip(of_line, affine.parts, strict=True))
+    force = [1, 1j] @ np.random.default_rng(0).standard_normal((2, len(A)))
+    expected = np.linalg.solve(A, force)
+    for share in (0.0, 0.5):
+        found = line_solution(affine, of_line, force, fluid_share=share)
+        assert np.linalg.norm(found - expected) < 1e-6 * np.linalg.norm(expected)
+    for name in ("RESTART", "CYCLES"):
+        monkeypatch.setattr(sys.modules["fem.affine"], name, 1)
+    with pytest.raises(fem.Diverged, match="residual of 1e-08 in 1 iterations"):
+        line_solution(affine, of_line, force, fluid_share=0.5)
 
 
 def test_a_fit_reduces_a_sheet_in_air_once(monkeypatch):

@@ -8,10 +8,11 @@ import pytest
 from corpus import FREE, SHORT
 
 from bench.plans import MOST, stated_and_true
-from simple_model import Trajectory
+from simple_model import Material, MovingPressure, Tacton, Trajectory
 from skinwave import SkinwaveWarning, loads, simulate
 from skinwave.bodies.build import build
 from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
+from skinwave.bodies.supports import Mounting
 from skinwave.models import named
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
@@ -20,7 +21,7 @@ from skinwave.planning.plan import plan
 from skinwave.planning.refinement import SizeController, refine
 from skinwave.planning.simulate import compute
 from skinwave.results.comparison import compare
-from skinwave.scene.scene import Body, Layer
+from skinwave.scene.scene import BODIES, Body, Layer, Scene, Sides
 
 LOSSLESS = (
     "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.4999, viscosity_pa_s=VISCOUS}"
@@ -32,53 +33,29 @@ size_x_mm = 30
 base = "free"
 sides = {left = "absorbing", right = "free", front = "free", back = "free"}
 """
-LAYERS = """
-[tacton]
-am_frequency_hz = 136
-duration_s = 0.041
-[body]
-size_x_mm = 21
-size_y_mm = 24.4
-thickness_mm = 8.5
-sides = "clamped"
-material = {density_kg_m3 = 1000, shear_modulus_pa = 20500, poisson = 0.49, viscosity_pa_s = 6.4}
-[[body.layers]]
-thickness_mm = 1.8
-material = {density_kg_m3 = 1000, shear_modulus_pa = 23400, poisson = 0.4999, viscosity_pa_s = 4.8}
-[[body.layers]]
-thickness_mm = 1.8
-material = {density_kg_m3 = 1000, shear_modulus_pa = 26300, poisson = 0.49, viscosity_pa_s = 7.5}
-[probes]
-points_mm = [[0.8, 7.6], [1.1, 4.4], [8.0, 6.2]]
-"""
-LAYER = """
-[tacton]
-am_frequency_hz = 140
-duration_s = 0.03
-[body]
-thickness_mm = 10
-size_x_mm = 24
-size_y_mm = 24
-[probes]
-points_mm = [[0, 0], [5, 0]]
-"""
-BLOCK = LAYER.replace("= 24", "= 12").replace("= 10\n", "= 6\n").replace("5, 0", "3, 0")
-CANTILEVER = """
-[tacton]
-am_frequency_hz = 60
-duration_s = 0.05
-[focus]
-peak_pressure_pa = 0.1
-[body]
-kind = "sheet"
-size_x_mm = 30
-size_y_mm = 30
-thickness_mm = 0.2
-[body.mounting]
-edges = ["front"]
-[probes]
-points_mm = [[0, 0], [5, 5]]
-"""
+UPPER, MIDDLE, LOWER = (
+    Material(density=1000, shear_modulus=mu, poisson=nu, viscosity=eta)
+    for mu, nu, eta in ((23400, 0.4999, 4.8), (26300, 0.49, 7.5), (20500, 0.49, 6.4))
+)
+LAYERS = Scene(
+    pressure=MovingPressure(tacton=Tacton(am_frequency=136, duration=0.041)),
+    body=Body(
+        width=0.021, height=0.0244, depth=0.0085, sides="clamped", material=LOWER,
+        layers=tuple(Layer(thickness=1.8e-3, material=solid) for solid in (UPPER, MIDDLE)),
+    ),
+    probes=((0.8e-3, 7.6e-3), (1.1e-3, 4.4e-3), (8.0e-3, 6.2e-3)),
+)  # fmt: skip
+LAYER = Scene(
+    pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.03)),
+    body=Body(width=0.024, height=0.024, depth=0.01), probes=((0.0, 0.0), (0.005, 0.0)),
+)  # fmt: skip
+SMALL = Body(width=0.012, height=0.012, depth=0.006)
+BLOCK = replace(LAYER, body=SMALL, probes=((0.0, 0.0), (0.003, 0.0)))
+TONGUE = {"width": 0.03, "height": 0.03, "depth": 2e-4, "mounting": Mounting(edges=("front",))}
+CANTILEVER = Scene(
+    pressure=MovingPressure(tacton=Tacton(am_frequency=60, duration=0.05), peak_pressure=0.1),
+    body=replace(BODIES["paper-sheet-loose"], **TONGUE), probes=((0.0, 0.0), (0.005, 0.005)),
+)  # fmt: skip
 
 
 def test_the_plan_prefers_wavenumber_integrals():
@@ -98,15 +75,14 @@ def test_a_slab_without_loss_is_planned():
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "[body]\nsides = 'free'\nsize_x_mm = 26\nsize_y_mm = 26",
-        "[focus]\nprofile = 'array'\n[body]\nsize_x_mm = 40\nsize_y_mm = 40",
-    ],
-)
-def test_the_plan_takes_elements_where_sides_reflect_or_the_focus_has_lobes(text):
-    text = "[tacton]\nduration_s = 0.1\n" + text + "\n[probes]\npoints_mm = [[0, 0], [5, 0]]"
-    loose, tight = (plan(loads(text), SolveOptions(tolerance=x)) for x in (0.3, 0.1))
+    ("body", "profile"),
+    [({"width": 0.026, "height": 0.026, "sides": "free"}, "gaussian"),
+     ({"width": 0.04, "height": 0.04}, "array")],
+)  # fmt: skip
+def test_the_plan_takes_elements_where_sides_reflect_or_the_focus_has_lobes(body, profile):
+    load = MovingPressure(tacton=Tacton(duration=0.1), profile=profile)
+    scene = replace(LAYER, pressure=load, body=Body(**body))
+    loose, tight = (plan(scene, SolveOptions(tolerance=x)) for x in (0.3, 0.1))
     assert loose.model == tight.model == "fem"
     assert tight.h <= loose.h
     assert loose.error <= 0.3
@@ -271,9 +247,9 @@ def test_errors_above_the_tolerance_are_warned_of():
         assert any(" %" in warning for warning in warnings), part
 
 
-@pytest.mark.parametrize(("text", "tolerance"), [(FREE, 0.1), (LAYERS, 0.05)])
-def test_stated_errors_of_small_bodies_are_true(text, tolerance):
-    stated, true = stated_and_true(loads(text), tolerance)
+@pytest.mark.parametrize(("scene", "tolerance"), [(FREE, 0.1), (LAYERS, 0.05)])
+def test_stated_errors_of_small_bodies_are_true(scene, tolerance):
+    stated, true = stated_and_true(scene, tolerance)
     assert true < MOST * stated
     assert stated < tolerance
 
@@ -290,7 +266,7 @@ def stated(scene, steady, rest, **given):
 
 @pytest.mark.parametrize("quantity", ["displacement", "acceleration"])
 def test_modes_of_a_plate_state_the_start(quantity):
-    scene = loads(f'{CANTILEVER}quantity = "{quantity}"')
+    scene = replace(CANTILEVER, quantity=quantity)
     error, left, said = stated(scene, "plate-modes", "plate-modes-transient")
     assert left > 0.2
     assert left <= error < 1.05 * left + 0.02
@@ -300,8 +276,7 @@ def test_modes_of_a_plate_state_the_start(quantity):
 
 @pytest.mark.parametrize("quantity", ["acceleration", "strain_zz"])
 def test_wavenumber_integrals_state_the_start_of_the_quantity(quantity):
-    depth = "depth_mm = 2" if quantity == "strain_zz" else ""
-    scene = loads(f'{LAYER}quantity = "{quantity}"\n{depth}')
+    scene = replace(LAYER, quantity=quantity, depth=2e-3 if quantity == "strain_zz" else 0.0)
     error, left, said = stated(scene, "flat-body-harmonic", "flat-body")
     assert left > 0.05
     assert error == pytest.approx(left, rel=0.02)
@@ -310,7 +285,7 @@ def test_wavenumber_integrals_state_the_start_of_the_quantity(quantity):
 
 @pytest.mark.parametrize("quantity", ["velocity", "acceleration"])
 def test_wavenumber_integrals_state_a_jump_above_their_band(quantity):
-    scene = loads(f'{LAYER}quantity = "{quantity}"')
+    scene = replace(LAYER, quantity=quantity)
     found = compute(scene, "flat-body")
     times = found.times[1] / 16 * np.arange(16 * len(found.times))
     fine = named("flat-body").solve(scene, times, SolveOptions(tolerance=1e-3))
@@ -320,7 +295,7 @@ def test_wavenumber_integrals_state_a_jump_above_their_band(quantity):
 
 
 def test_elements_state_the_start_of_the_quantity():
-    scene = loads(f'{BLOCK}quantity = "acceleration"')
+    scene = replace(BLOCK, quantity="acceleration")
     error, left, _ = stated(scene, "fem-harmonic", "fem", h=6e-3)
     assert left > 0.1
     of_mesh = plan(scene, SolveOptions(model="fem", h=6e-3)).error
@@ -328,7 +303,8 @@ def test_elements_state_the_start_of_the_quantity():
 
 
 def test_the_error_of_the_start_is_that_of_the_requested_times():
-    scene = loads(LAYER.replace("0.03", "0.5"))
+    load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.5))
+    scene = replace(LAYER, pressure=load)
     whole, *parts = (
         stated(scene, "flat-body-harmonic", "flat-body", times=np.arange(*span) / 1e4)
         for span in ((5000,), (100,), (4000, 5000))
@@ -339,8 +315,8 @@ def test_the_error_of_the_start_is_that_of_the_requested_times():
 
 
 def test_the_drift_of_an_unconstrained_body_is_in_its_error():
-    free = "base = 'free'\nsides = {left='absorbing', right='free', front='free', back='free'}"
-    scene = loads(BLOCK.replace("[probes]", f"{free}\n[probes]"))
+    sides = Sides(left="absorbing", right="free", front="free", back="free")
+    scene = replace(BLOCK, body=replace(SMALL, base="free", sides=sides))
     error, left, _ = stated(scene, "fem-harmonic", "fem", h=6e-3)
     assert 0.9 < left < 1.2
     assert left < error + 0.01 < 2.0
