@@ -1,7 +1,6 @@
 """Command line, pages, Python, sweep and comparison give the same warnings of a response."""
 
 import csv
-import html
 import json
 import warnings
 from dataclasses import replace
@@ -18,6 +17,7 @@ from skinwave.planning.plan_warnings import implausible, stretching
 from skinwave.planning.simulate import compute, solve
 from skinwave.scene.file import loads
 from skinwave.scene.scene import Body, Scene
+from skinwave.system.templates import typeset
 
 POINT = '[tacton]\nshape = "circle"\nsize_mm = 6\nspeed_m_per_s = 3\nduration_s = 0.05\n'
 AM = POINT + "am_frequency_hz = 140\n"
@@ -46,7 +46,7 @@ def options_of(arguments):
 
 def page_warnings(path):
     banner = path.read_text().split('<div class="warning"')[1].split("</div>")[0]
-    return [html.unescape(p.split(".</p>")[0]) for p in banner.split("<p>Take care: ")[1:]]
+    return [p.split(".</p>")[0] for p in banner.split("<p>Take care: ")[1:]]
 
 
 @pytest.mark.parametrize("name", sorted(WARNED.keys() - {"no waves"}))
@@ -70,7 +70,7 @@ def test_run_and_simulate_give_the_same_warnings(name, tmp_path, monkeypatch, ca
     summary = json.loads(printed.out)
     assert summary["warnings"] == sentences
     assert summary["expected_error"] == pytest.approx(response.expected_error)
-    assert page_warnings(tmp_path / "scene-out/index.html") == sentences
+    assert page_warnings(tmp_path / "scene-out/index.html") == [*map(typeset, sentences)]
 
 
 @pytest.mark.parametrize("name", ["no waves", "sheet beyond linear bending"])
@@ -100,7 +100,7 @@ def test_pages_of_several_models_have_the_same_warnings(tmp_path, monkeypatch, c
     (tmp_path / "scene.toml").write_text(with_probe_twice(LOUD_PAPER))
     assert main(["compare", "scene.toml", "--element-size", "5", "--quiet"]) == 0
     banner = page_warnings(tmp_path / "scene-compared/index.html")
-    assert [x.removesuffix(" (sheet)") for x in banner] == list(sentences)
+    assert [x.removesuffix(" (sheet)") for x in banner] == [*map(typeset, sentences)]
     assert capsys.readouterr().err.count("skinwave: warning: ") == len(sentences)
     effort = next((tmp_path / "scene-compared").glob("*/sheet/effort.json"))
     assert json.loads(effort.read_text())["warnings"] == list(sentences)
