@@ -1,12 +1,14 @@
-"""One scene gives the same numbers by Python, command line, sweep and a body with free keys."""
+"""One scene gives the same numbers by every door, and models agree within their stated errors."""
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import skinwave
+from bench.agreement import Outcome, Pair, outcome, table
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.commands.cli import main
 from skinwave.models import named
@@ -27,6 +29,14 @@ SCENE = Scene(
 SIZE = 2e-3  # metre
 AM = "tacton.am_frequency_hz"
 MODULUS = "body.material.shear_modulus_pa"
+SEED = 4711
+# Of the first hundred: slabs and sheets of each kind of support and quantity that take seconds.
+NUMBERS = 2, 6, 14, 17, 19, 25, 30, 46, 63, 65, 76, 92, 97
+# The slow checks, every line or step a solution of its own, are left to `bench.agreement`.
+MODELS = (
+    "flat-body", "flat-body-harmonic", "fem", "plate-modes", "plate-modes-transient",
+    "plate-modes-nonlinear", "fem-nonlinear",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -78,3 +88,17 @@ def test_commands_write_what_python_returns(simulated, tmp_path, monkeypatch):
         np.testing.assert_allclose(arrays["fem"], simulated.values, atol=1e-6 * largest)
     record = json.loads(Path("run/record.json").read_text())
     assert record["expected_error"] == pytest.approx(simulated.expected_error, rel=1e-6)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_models_agree_within_their_stated_errors(number):
+    found = outcome(number, table(number, SEED), MODELS, slowest=math.inf)
+    assert not found.faults
+    assert not found.disagreements, found.scene
+
+
+def test_a_difference_above_the_stated_errors_is_reported():
+    """A difference of 3 % between responses with a stated error of 1 % each."""
+    found = Outcome(0, {})
+    found.pairs = [Pair(("a", "b"), 0.03, 0.02), Pair(("a", "c"), 0.02, 0.02)]
+    assert [pair.models for pair in found.disagreements] == [("a", "b")]

@@ -84,7 +84,6 @@ def test_a_quarter_in_air_moves_like_the_whole():
 
 @pytest.mark.slow
 def test_small_motion_of_a_stretching_sheet_is_linear():
-    """About its mean and after its start, in modes and in moments; no line meets a resonance."""
     tacton = replace(LOAD.tacton, duration=0.4, am_frequency=60.0)
     scene = replace(SCENE, pressure=replace(LOAD, peak_pressure=1e-3, tacton=tacton))
     times = np.arange(4000) / 1e4

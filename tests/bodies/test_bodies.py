@@ -89,7 +89,6 @@ def test_the_motion_of_a_lifted_body_follows_the_axial_pressure():
 
 
 def test_a_body_of_half_the_size_moves_alike():
-    """Only the waves that its sides reflect differ; of a focus at rest a quarter is enough."""
     scene = skinwave.Scene(pressure=STILL, body=Body(), probes=((0.0, 0.0), (0.015, 0.0)))
     sizes = (replace(scene, body=Body(width=side, height=side)) for side in (0.1, 0.05))
     whole, half = (
@@ -121,7 +120,6 @@ def test_a_probe_beside_a_crease_reads_along_the_mean_normal():
 
 @pytest.fixture
 def block_file(tmp_path):
-    """A block of 50 x 50 x 10 mm with few elements, in a file."""
     block = meshes.block((0.05, 0.05, 0.01), 0.005)
     top, bottom, sides = (block.facets[name] for name in ("top", "clamped", "absorbing"))
     named = replace(block, facets={"top": top, "bottom": bottom, "sides": sides})
@@ -149,7 +147,6 @@ def test_a_mesh_in_a_file_is_a_body_of_a_scene(block_file, tmp_path):
 
 @pytest.fixture
 def dome(tmp_path):
-    """A block of 40 x 40 x 10 mm whose underside slopes."""
     block = meshes.block((0.04, 0.04, 0.01), 0.005, order=1)
     points = block.points.copy()
     points[:, 2] *= 1 - 40 * np.abs(points[:, 0])
@@ -162,7 +159,6 @@ def built(folder, mesh):
 
 
 def test_a_mesh_in_a_file_keeps_its_own_bottom(dome, tmp_path):
-    """Half of what looks downwards, and a side; also below a top of its own."""
     own = meshes.tag_boundary(
         dome, bottom=lambda at, normals: (at[:, 0] < -0.0101) & (normals[:, 2] < 0.5)
     )
@@ -215,7 +211,6 @@ def test_layers_of_a_body_from_a_file_lie_below_its_top(block_file):
 
 @pytest.mark.slow
 def test_a_flat_palm_moves_like_a_slab(monkeypatch):
-    """Sides free, ends with dashpots, and elements that do not cut the sharp rim off."""
     size = {"width": 0.07, "height": 0.07, "depth": 0.01, "material": "forearm"}
     flat = Relief(
         cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, corner_radius=0.002,
@@ -227,9 +222,7 @@ def test_a_flat_palm_moves_like_a_slab(monkeypatch):
     def with_ends(body, h, symmetry, *discretise):
         made = build(body, h, symmetry, *discretise)
         at_end = 0.999 * body.height / 2  # not the plane of symmetry, which has the same normal
-        mesh = meshes.tag_boundary(
-            made.mesh, ends=lambda centres, _: np.abs(centres[:, 1]) > at_end
-        )
+        mesh = meshes.tag_boundary(made.mesh, ends=lambda at, _: np.abs(at[:, 1]) > at_end)
         return replace(made, mesh=mesh, absorbing=mesh.facets["ends"])
 
     monkeypatch.setattr("skinwave.models.meshed.build_body", with_ends)
@@ -253,7 +246,6 @@ def test_invalid_bodies_are_refused():
 def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(
     in_one_process, tmp_path, monkeypatch
 ):
-    """Hand of 2,314 triangles with seams, in metre, its palm towards -x, as its makers left it."""
     monkeypatch.chdir(tmp_path)
     short = MovingPressure(tacton=replace(STILL.tacton, duration=0.05))
     (tmp_path / "scene.toml").write_text(dumps(replace(SKIN, pressure=short, probes=THREE[:2])))
@@ -265,8 +257,6 @@ def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(
     assert "elements of 16 mm" in page  # of the map, too
     assert "--up -x --element-size 16" in page
     rows = list(csv.DictReader((tmp_path / "both/lines.csv").read_text().splitlines()))
-    moved = [
-        float(r["displacement_um"]) for r in rows if r["line"] == "f_AM" and r["body"] == "mesh"
-    ]
-    assert 0.1 < max(moved) < 10
+    at_am = (row for row in rows if (row["line"], row["body"]) == ("f_AM", "mesh"))
+    assert 0.1 < max(float(row["displacement_um"]) for row in at_am) < 10
     assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "both"}

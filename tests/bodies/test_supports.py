@@ -1,21 +1,24 @@
-"""Supports of a body: Young's modulus, sides one by one, and an elastic base."""
+"""Supports and layers of a body: moduli, sides one by one, elastic bases, stacks of layers."""
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
 
 import fem
+from bench.layered_skin import RANGES, values_of
 from fem.boundary import springs
 from fem.load_and_probe import facet_normals
 from meshes import block, boundary_facets
-from simple_model import Material, Stack, from_young
+from simple_model import Material, MovingPressure, Stack, Tacton, flat_body, from_young
+from simple_model.layers.compliance import layered
 from simple_model.layers.flat_quantities import quantity_field
 from simple_model.layers.layered import surface_compliance
 from simple_model.layers.wavenumber_integral import point_integrals
 from simple_model.quantities import DISPLACEMENT
-from skinwave import Body, dumps, loads
-from skinwave.bodies import Sides
+from skinwave import dumps, loads
+from skinwave.bodies import BODIES, Sides
 from skinwave.bodies.analytic import stack
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.tissue import support
@@ -23,14 +26,22 @@ from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
 from skinwave.planning.extent import symmetry
+from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
-from skinwave.scene.scene import Load
+from skinwave.scene.scene import Body, Layer, Load, Scene, solid_of
+from skinwave.verify.predictions import leading_wave
 
 SOLID = Material(density=1000, shear_modulus=2e4, poisson=0.3, viscosity=6.0)
 SOFT = Material(density=1000, shear_modulus=6e3, poisson=0.49, viscosity=2.0)
 YOUNG = "[body.material]\ndensity_kg_m3 = 1000\npoisson = 0.25\nyoung_modulus_pa = 75e3\n"
 WIDTH = 7e-3  # m, standard deviation: a spot that coarse elements resolve
 BED = 3e6  # N/m3: a slab of 10 mm of SOLID is about twice as stiff in shear
+LAYERS = (Layer(thickness=0.3e-3, material="epidermis"), Layer(thickness=4e-3, material="fat"))
+SKIN = Scene(
+    pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05)),
+    body=Body(material="muscle", layers=LAYERS), probes=((0.0, 0.0), (0.01, 0.0)),
+)  # fmt: skip
+TIMES = np.arange(500) / 1e4
 
 
 def test_youngs_modulus_gives_the_shear_modulus():
@@ -156,3 +167,51 @@ def test_a_hand_rests_on_springs_where_it_faces_down():
     forces = springs(mesh, found) @ np.ones(mesh.n_dofs)
     np.testing.assert_allclose(forces.reshape(-1, 3).sum(axis=0), BED * 0.02 * 0.03)
     assert not found.absorbed.any()
+
+
+def changed(**body):
+    return replace(SKIN, body=replace(SKIN.body, **body))
+
+
+@pytest.mark.parametrize(
+    ("body", "base", "last"),
+    [
+        ({}, "clamped", 10.7e-3),
+        ({"base": "free"}, "free", 10.7e-3),
+        ({"base": "absorbing"}, "clamped", inf),
+        ({"depth": inf}, "clamped", inf),
+    ],
+)
+def test_a_slab_is_the_stack_of_its_layers(body, base, last):
+    found = stack(changed(**body).body)
+    assert found.materials == tuple(map(solid_of, ("epidermis", "fat", "muscle")))
+    assert found.thicknesses == pytest.approx((0.3e-3, 4e-3, last))
+    assert found.base == base or last == inf
+
+
+@pytest.mark.parametrize("body", [{}, {"base": "absorbing"}])
+def test_a_plan_takes_the_wavenumber_integral_of_layers(body):
+    scene = changed(**body)
+    required = plan(scene)
+    assert required.model in ("flat-body", "flat-body-harmonic")
+    found = compute(scene, "flat-body").displacement
+    own = flat_body(layered(stack(scene.body)), scene.pressure, scene.probe_points, TIMES)
+    np.testing.assert_array_equal(found, own.displacement)
+
+
+@pytest.mark.parametrize(
+    ("preset", "speeds", "lengths"),
+    [("palm-layers", (8.5, 5.1), (40, 30)), ("forearm-layers", (3.5, 3.2), (21, 7.8))],
+)
+def test_wave_speeds_of_layers_agree_with_the_manual(preset, speeds, lengths):
+    wave = leading_wave(BODIES[preset], [100.0, 200.0])
+    assert wave.speed == pytest.approx(speeds, rel=0.03)
+    assert 1e3 * wave.length == pytest.approx(lengths, rel=0.03)
+
+
+@pytest.mark.parametrize("preset", RANGES)
+def test_each_fitted_number_is_within_its_range(preset):
+    found = values_of(BODIES[preset], RANGES[preset])
+    for name, each in RANGES[preset].items():
+        assert each.low <= found[name] <= each.high or found[name] == pytest.approx(each.low)
+        assert each.source

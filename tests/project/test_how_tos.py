@@ -1,6 +1,4 @@
-"""How-to pages: a user's own code, at most 30 lines a block, does what the page says, in an empty
-folder, block after block.
-"""
+"""How-to pages: a user's own code does what the page says in an empty folder, block after block."""
 
 import re
 import shlex
@@ -32,7 +30,6 @@ LONGEST = 30  # lines of code
 
 
 def blocks(page):
-    """Language and text of each block of code; scenes first, as they are files."""
     found = re.findall(r"```(\w+)\n(.*?)```", (DOCS / f"{page}.md").read_text("utf-8"), re.DOTALL)
     return sorted(found, key=lambda block: block[0] != "toml")
 

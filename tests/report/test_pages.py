@@ -95,7 +95,6 @@ def ran(folder):
 
 
 def reported(folder):
-    """Report of a folder of results that someone else has made."""
     ran(folder)
     result = folder / "out"
     row = {"what": HOSTILE, "value": HOSTILE, "reason": HOSTILE}
@@ -118,9 +117,7 @@ def compared(folder):
 
 @contextmanager
 def opened(browser, path, obeyed=False):
-    """A page and what its console said; without its policy if the page is to be `obeyed`. It is
-    closed in the end: the pictures of reports move as long as they are open.
-    """
+    """A page and what its console said, closed in the end; without its policy if `obeyed`."""
     context = browser.new_context(bypass_csp=obeyed)
     tab, said = context.new_page(), []
     tab.on("console", lambda message: said.append(message.text))
@@ -133,8 +130,6 @@ def opened(browser, path, obeyed=False):
 
 
 class Tags(HTMLParser):
-    """What elements a page has, and its text."""
-
     def __init__(self, page):
         super().__init__()
         self.found, self.text = set(), ""

@@ -18,9 +18,7 @@ REDUCED = 0.05  # relative error of the reduced-order model of a whole body
 
 @pytest.fixture
 def result(tmp_path_factory, monkeypatch):
-    """Folder of a command on an example; without three-dimensional pictures, and those of motion
-    from a less accurate reduced-order model.
-    """
+    """Folder of a command on an example, without three-dimensional pictures, on coarse models."""
     none = Renderer(is_available=False, detail="not asked")
     monkeypatch.setattr("skinwave.studies.report.renderer", lambda: none)
     monkeypatch.setattr("skinwave.studies.album.REDUCTION_TOLERANCE", REDUCED)
@@ -48,7 +46,6 @@ def test_every_example_is_compared(name, result):
 
 
 def body_response(folder):
-    """The response of a body in a folder of results."""
     files = (file for file in Path(folder).rglob("responses.npz") if "kernel" not in str(file))
     for file in files:
         with np.load(file) as arrays:
@@ -71,6 +68,5 @@ def check_map(folder, response):
     there = away < 1e-9
     steady = response.values[len(response.times) // 2 :].std(axis=0)
     assert there.any()
-    np.testing.assert_allclose(
-        rms[row[there], column[there]], steady[there], atol=0.02 * steady.max()
-    )
+    found = rms[row[there], column[there]]
+    np.testing.assert_allclose(found, steady[there], atol=0.02 * steady.max())

@@ -71,7 +71,6 @@ def test_claims_about_the_simulation_hold_in_the_published_kernel(claims):
 
 
 def test_the_load_determines_which_lines_are_present(claims):
-    """The same components exist in the kernel under the same load and in a linear body."""
     for claim in ("S1", "S2", "S3", "S5", "M1", "M2", "M3"):
         of_both = [claims[column, claim]["holds"] for column in ("point-kernel", "skin-slab")]
         assert of_both[0] == of_both[1], claim
@@ -80,7 +79,6 @@ def test_the_load_determines_which_lines_are_present(claims):
 
 
 def test_a_stretching_sheet_adds_harmonics(claims):
-    """M1 was measured on paper: 2 f_AM and 3 f_AM under AM alone."""
     assert claims["paper-sheet", "M1"]["holds"] == "True"
 
 
