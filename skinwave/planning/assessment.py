@@ -15,7 +15,6 @@ from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.planning import errors, refinement
 from skinwave.planning.extent import absorbing_error
-from skinwave.planning.left_out import stretching_error
 from skinwave.planning.plan import plan
 from skinwave.planning.plan_warnings import response_warnings
 from skinwave.scene.scene import Body, Scene, without_tacton
@@ -58,13 +57,14 @@ def assess(
     )  # fmt: skip
     series = errors.series_part(scene, response.model, tolerance, coarse)
     parts += [series] if series else []
-    stretching = stretching_error(scene, named(response.model), tolerance)
+    stretching = errors.stretching_part(scene, named(response.model), tolerance)
+    error = errors.total_error([*parts, stretching])
     warnings = (
         *errors.element_warnings(scene, size, mesh),
         *errors.part_warnings(parts, tolerance),
+        *errors.total_warning([*parts, stretching], error, tolerance),
         *response_warnings(scene, response, mesh, tolerance),
     )
-    error = errors.total_error([*parts, errors.ErrorPart(source="stretching", error=stretching)])
     effort = replace(response.effort, warnings=warnings)
     return replace(response, expected_error=error, effort=effort)
 

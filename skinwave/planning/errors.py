@@ -1,6 +1,6 @@
 """Expected error of a response: its parts, their total, and the resulting warnings."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -8,10 +8,11 @@ import numpy as np
 
 from skinwave.models import Model, named
 from skinwave.models.laws import own_laws, series_tolerance
+from skinwave.models.plate_modes import STRETCHED
 from skinwave.models.reduced import BAND, ReducedBody
 from skinwave.models.relative_change import change_text
 from skinwave.planning.estimates import spot_scale
-from skinwave.planning.left_out import series_error
+from skinwave.planning.left_out import series_error, stretching_error
 from skinwave.planning.plan_warnings import ERROR_UNKNOWN, rigid_body_drift, under_resolved
 from skinwave.planning.refinement import enough
 from skinwave.scene.scene import Scene
@@ -42,6 +43,22 @@ def part_warnings(parts: Iterable[ErrorPart], tolerance: float) -> tuple[str, ..
         for part in parts
         if part.error > tolerance
     )
+
+
+def total_warning(parts: Sequence[ErrorPart], error: float, tolerance: float) -> tuple[str, ...]:
+    """Return a warning if the total error is above the tolerance, but none of its parts is."""
+    if not error > tolerance or any(part.error > tolerance for part in parts):
+        return ()
+    cure = max(parts, key=lambda part: part.error).cure
+    return part_warnings([ErrorPart(source="all errors", error=error, cure=cure)], tolerance)
+
+
+def stretching_part(scene: Scene, model: Model, tolerance: float) -> ErrorPart:
+    """Return the part due to stretching, which a linear model of a sheet leaves out."""
+    return ErrorPart(
+        source=f"stretching, which {model.name} leaves out",
+        error=stretching_error(scene, model, tolerance), cure=f"use --model {STRETCHED.name}",
+    )  # fmt: skip
 
 
 def element_parts(

@@ -99,15 +99,22 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     """
     request = _choose_model(scene, options, sample_grid(scene, options.times))
     if not scene.body.of_kind.discretise:
-        planned = Plan(model=request.model.name, body=scene.body, rows=(request.model_row(),))
-    elif request.model.error:
-        planned = _plan_known_error(request)
+        row = request.model_row()
+        return Plan(model=request.model.name, body=scene.body, rows=(row,), options=options)
+    if request.model.error:
+        planned, parts = _plan_known_error(request)
     elif request.model.is_infinite:
-        planned = _plan_wavenumber_integral(request)
+        planned, parts = _plan_wavenumber_integral(request)
     else:
-        planned = _plan_elements(request)
-    stretching = left_out.stretching_error(scene, request.model, options.tolerance)
-    return replace(planned, error=planned.error + stretching, options=options)
+        planned, parts = _plan_elements(request)
+    tolerance = options.tolerance
+    stretching = errors.stretching_part(scene, request.model, tolerance)  # has its own warning
+    error = planned.error + stretching.error
+    warnings = (
+        *planned.warnings, *errors.part_warnings(parts, tolerance),
+        *errors.total_warning([*parts, stretching], error, tolerance),
+    )  # fmt: skip
+    return replace(planned, error=error, warnings=warnings, options=options)
 
 
 def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
@@ -229,8 +236,8 @@ def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
     )
 
 
-def _plan_known_error(request: _Request) -> Plan:
-    """Plan a model that states its own error.
+def _plan_known_error(request: _Request) -> tuple[Plan, list[ErrorPart]]:
+    """Plan a model that states its own error, and return the parts of its error.
 
     The error of a sheet at large deflection does not follow from the linear response, because
     stretching stiffens the sheet and makes its waves longer.
@@ -253,18 +260,19 @@ def _plan_known_error(request: _Request) -> Plan:
         rows += [r for r in neglected if not (model.is_nonlinear and "stretching" in r.what)]
     own = model.error(scene, size) if model.error else np.nan
     parts = [ErrorPart(source=source, error=own, cure=cure), errors.start_part(model, start)]
-    return Plan(
+    planned = Plan(
         model=model.name, body=scene.body, h=size, highest=highest, error=errors.total_error(parts),
         rows=(*([line_row] if line_row else []), *rows), seconds=model.seconds,
-        memory=model.memory, warnings=(
-            *(() if np.isfinite(own) else (NO_ERROR.format(model.name),)),
-            *errors.part_warnings(parts, request.tolerance),
-        ),
+        memory=model.memory,
+        warnings=() if np.isfinite(own) else (NO_ERROR.format(model.name),),
     )  # fmt: skip
+    return planned, parts
 
 
-def _plan_wavenumber_integral(request: _Request) -> Plan:
-    """Plan a wavenumber integral, which leaves out reflections from the sides."""
+def _plan_wavenumber_integral(request: _Request) -> tuple[Plan, list[ErrorPart]]:
+    """Plan a wavenumber integral, which leaves out reflections from the sides, and return the parts
+    of its error.
+    """
     scene, model, tolerance = request.scene, request.model, request.tolerance
     highest, line_row = _highest_line(scene, tolerance)
     start, reflections = request.start_error(), _reflections(scene)
@@ -279,19 +287,22 @@ def _plan_wavenumber_integral(request: _Request) -> Plan:
         errors.band_part(
             scene, TRANSFORM_RATE / 4, left_out.above_band_error(scene, model, request.grid)
         ),
-        ErrorPart(source="the wavenumber integral", error=INTEGRAL_ERROR),
+        ErrorPart(
+            source="the wavenumber integral",
+            error=INTEGRAL_ERROR,
+            cure=f"use a tolerance of {100 * INTEGRAL_ERROR:g} % or more",
+        ),
     ]
     planned = Plan(
         model=model.name, body=scene.body, highest=highest, seconds=model.seconds,
         memory=model.memory, error=errors.total_error(parts, independent=True),
         rows=(line_row, request.model_row(start), *neglected_rows(scene, highest)),
-        warnings=errors.part_warnings(parts[:3], tolerance),
     )  # fmt: skip
-    return _with_series(planned, request)
+    return _with_series(planned, request, parts)
 
 
-def _plan_elements(request: _Request) -> Plan:
-    """Plan linear elements: extent, mesh, and remaining errors."""
+def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
+    """Plan linear elements: extent and mesh; and return the parts of their error."""
     scene, model, tolerance = request.scene, request.model, request.tolerance
     options, (times, _) = request.options, request.grid
     highest, line_row = _highest_line(scene, tolerance)
@@ -325,12 +336,9 @@ def _plan_elements(request: _Request) -> Plan:
             line_row, request.model_row(start), *rows,
             *element_rows(scene, tolerance, axes, mesh, highest, options.h),
         ),
-        warnings=(
-            *errors.element_warnings(scene, mesh.h, mesh.error),
-            *errors.part_warnings(parts, tolerance),
-        ),
+        warnings=errors.element_warnings(scene, mesh.h, mesh.error),
     )  # fmt: skip
-    return _with_series(planned, replace(request, scene=scene))
+    return _with_series(planned, replace(request, scene=scene), parts)
 
 
 def _step_part(scene: Scene, dt: float | None) -> ErrorPart:
@@ -343,12 +351,14 @@ def _step_part(scene: Scene, dt: float | None) -> ErrorPart:
     return ErrorPart(source=source, error=error, cure="use a smaller time step")
 
 
-def _with_series(planned: Plan, request: _Request) -> Plan:
+def _with_series(
+    planned: Plan, request: _Request, parts: list[ErrorPart]
+) -> tuple[Plan, list[ErrorPart]]:
     """Add the error of Prony series to a plan, if its model uses them for modulus laws."""
     scene, tolerance = request.scene, request.tolerance
     part = errors.series_part(scene, planned.model, tolerance, planned.prepared)
     if part is None:
-        return planned
+        return planned, parts
     rows = tuple(
         PlanRow(
             what="modulus law",
@@ -358,7 +368,5 @@ def _with_series(planned: Plan, request: _Request) -> Plan:
         )
         for solid in own_laws(scene.body)
     )
-    return replace(
-        planned, error=planned.error + part.error, rows=(*planned.rows, *rows),
-        warnings=(*planned.warnings, *errors.part_warnings([part], tolerance)),
-    )  # fmt: skip
+    planned = replace(planned, error=planned.error + part.error, rows=(*planned.rows, *rows))
+    return planned, [*parts, part]

@@ -12,6 +12,7 @@ import skinwave
 from simple_model import MovingPressure, Response, Tacton
 from skinwave.commands.cli import main
 from skinwave.models.options import SolveOptions
+from skinwave.planning.errors import ErrorPart, total_warning
 from skinwave.planning.plan import plan
 from skinwave.planning.plan_warnings import implausible, stretching
 from skinwave.planning.simulate import compute, solve
@@ -71,6 +72,19 @@ def test_run_and_simulate_give_the_same_warnings(name, tmp_path, monkeypatch, ca
     assert summary["warnings"] == sentences
     assert summary["expected_error"] == pytest.approx(response.expected_error)
     assert page_warnings(tmp_path / "scene-out/index.html") == [*map(typeset, sentences)]
+
+
+def test_every_error_above_the_tolerance_is_a_warning():
+    """Also a total whose parts are all below it."""
+    parts = [ErrorPart(source=each, error=0.03, cure=f"change {each}") for each in ("a", "b")]
+    assert total_warning(parts, 0.06, 0.05)
+    assert not total_warning(parts, 0.06, 0.07)
+    scene, totals = loads(SLAB), 0
+    for tolerance in np.geomspace(0.02, 0.4, 12):
+        planned = plan(scene, SolveOptions(model="fem", h=3e-3, tolerance=tolerance))
+        assert (planned.error > tolerance) == bool(planned.warnings)
+        totals += "all errors" in " ".join(planned.warnings)
+    assert totals
 
 
 @pytest.mark.parametrize("name", ["no waves", "sheet beyond linear bending"])
