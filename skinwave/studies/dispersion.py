@@ -48,16 +48,17 @@ LINE_COLUMNS = (
 )  # fmt: skip
 CAPTION = (
     "Modes of the laterally infinite body. Strong lines: energy propagates. Pale lines: the mode "
-    "is evanescent, because it decays to 1/e within a quarter of its wavelength or its energy "
-    "moves at less than a twentieth of its phase speed. Dotted: lines of the load; dashed: speed "
-    "of the focus. The group speed is left out where loss changes the shape of a packet before it "
-    "moves on (imaginary part of dk/dω above the real part)."
+    "is evanescent. It decays to 1/e within a quarter of its wavelength, or its energy moves at "
+    "less than a twentieth of its phase speed. Dotted: lines of the load; dashed: speed of the "
+    "focus. The group speed is left out where loss distorts a wave packet (imaginary part of dk/dω "
+    "above the real part)."
 )
 EXPLAINED = (
-    "The driven mode moves the surface most at the edge of the main lobe of the focal spot; "
-    "propagating modes come first. Its share is relative to the sum of the magnitudes of all modes "
-    "there. Behind a focus that is faster than a wave, waves pile up at the Mach angle, sin a = "
-    "c/v, on a straight path. On a path as small as a wavelength no such cone forms."
+    "The driven mode of a line is the propagating mode that moves the surface most at the edge of "
+    "the main lobe of the focal spot, or an evanescent one if none propagates. Its share is "
+    "relative to the sum of the magnitudes of all modes there. On a straight path, a focus that is "
+    "faster than a wave leaves a wake at the Mach angle asin(c/v). On a path as small as a "
+    "wavelength, no such wake forms."
 )
 
 

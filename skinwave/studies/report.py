@@ -46,8 +46,8 @@ NO_VIEWS = (
 )
 TURNED = (
     "Turn it with the mouse, a finger or the arrow keys. Colour: motion about its mean, red into "
-    "the body, blue out of it; with ≥ in the legend, larger values have the last colour. Black: "
-    "path and focus; orange: probes."
+    "the body, blue out of it. If the legend has ≥, larger values have the end colour. Black: path "
+    "and focus; orange: probes."
 )
 MARKS = "Black: path and focus; yellow: probes."
 COMPARED = (
@@ -55,10 +55,10 @@ COMPARED = (
     "model's largest value. All models receive the same load."
 )
 SNAPSHOTS = (
-    "The surface when the body moves most, and a quarter, a half and three quarters of a turn of "
-    "the focus later (of a period of the strongest line, if the focus rests). Behind a focus that "
-    "is faster than the surface wave, lines at the Mach angle asin(c/v) are drawn; no clean cone "
-    "forms on a circle smaller than a wavelength."
+    "The surface when the body moves most, then at quarters of a turn of the focus, or of a period "
+    "of the strongest line if the focus rests. If the focus is faster than the surface wave, lines "
+    "behind it show the Mach angle asin(c/v). On a circle smaller than a wavelength, no clean cone "
+    "forms."
 )
 MAP = (
     "RMS of the quantity about its mean in the steady state. Dotted: path of the focus; white: "
@@ -214,8 +214,8 @@ def _plan_parts(album: Album) -> list[Part]:
     parts: list[Part] = [heading, Table(["", "", "reason"], rows)]
     if "misfit" in planned:
         parts.append(
-            "Pictures have larger elements. At the probes their motion differs from the response "
-            f"by {planned['model']} by {percent(planned['misfit'])}."
+            "Pictures have larger elements. At the probes, their motion differs by "
+            f"{percent(planned['misfit'])} from the response of {planned['model']}."
         )
     return [*parts, *(f"Warning: {text}." for text in planned["warnings"])]
 

@@ -128,21 +128,20 @@ def _mark(assessed: AssessedClaim | None) -> Markup | None:
 
 def _disagreements(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
     """Return sentences on claims measured on paper that a body contradicts."""
-    of_kernel = {v.claim: v for v in assessed_claims if v.model == SAME_LOAD.name}
-    texts: list[Part] = []
-    for assessed in assessed_claims:
-        if assessed.body == "none" or not assessed.claim.startswith("M") or assessed.holds:
-            continue
-        text = (
-            f"The {label(assessed.body)} contradicts {assessed.claim}, which was measured on paper."
-        )
-        kernel = of_kernel.get(assessed.claim)
-        if kernel is not None and kernel.holds:
-            text += " The point kernel under the same load does not, so the body is the cause."
-        elif kernel is not None:
-            text += " So does the point kernel under the same load."
-        texts.append(text)
-    return texts
+    of_kernel = {v.claim: v.holds for v in assessed_claims if v.model == SAME_LOAD.name}
+    groups: dict[tuple[str, bool | None], list[str]] = {}
+    for each in assessed_claims:
+        if each.body != "none" and each.claim.startswith("M") and not each.holds:
+            groups.setdefault((each.body, of_kernel.get(each.claim)), []).append(each.claim)
+    cause = {
+        True: " The point kernel under the same load does not, so the body is the cause.",
+        False: " So does the point kernel under the same load.",
+        None: "",
+    }
+    return [
+        f"The {label(body)} contradicts {', '.join(claims)}, measured on paper.{cause[holds]}"
+        for (body, holds), claims in groups.items()
+    ]
 
 
 def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Table:

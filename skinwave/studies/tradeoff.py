@@ -14,6 +14,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from simple_model import Response
+from simple_model.numbers import percent
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named, names
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
@@ -191,11 +192,12 @@ def write(folder: Path, scene: Scene, outcome: Study) -> None:
 
 def sentences(outcome: Study) -> list[str]:
     """Return sentences on the reference, and the cheapest candidate for each of `BARS`."""
-    convergence = f"{100 * outcome.self_convergence:.2g} %"
-    reference = f"The reference, {outcome.reference.name}, differs from the next coarser run by "
-    parts = [f"{reference}{convergence}."]
+    parts = [
+        f"The reference, {outcome.reference.name}, differs from the next coarser run by "
+        f"{percent(outcome.self_convergence)}."
+    ]
     if not outcome.is_converged:
-        limit = f"{1000 * outcome.self_convergence:.2g} %"
+        limit = percent(10 * outcome.self_convergence)
         parts[0] += f" Errors below {limit} are therefore upper estimates."
     if any(m.candidate.model == FLAT_BODY.name for m in outcome.results):
         parts.append(
@@ -205,7 +207,7 @@ def sentences(outcome: Study) -> list[str]:
     for bar in BARS:
         best = "no candidate"
         if m := outcome.cheapest(bar):
-            best = f"{m.candidate.name}, {m.cold:.2g} s (error {100 * m.error:.2g} %)"
+            best = f"{m.candidate.name}, {m.cold:.2g} s (error {percent(m.error)})"
         parts.append(f"Cheapest within {100 * bar:g} %: {best}.")
     return parts
 
