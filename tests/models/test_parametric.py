@@ -176,6 +176,22 @@ def test_affine_sums_are_the_operators():
     assert abs(summed - stiff).max() < 1e-12 * abs(stiff).max()
 
 
+def test_matrices_of_a_stretched_body_are_sums_over_known_geometries():
+    body = Body(
+        kind="disc", sides="absorbing", layers=(Layer(thickness=3e-3, material="dermis"),), **SMALL
+    )
+    keys = free_keys(body, {"body.layers.0.thickness_mm": (2.0, 4.0), THICKNESS: (8.0, 12.0)})
+    bodies = parametric._range(body, keys, H)
+    at = [key.share(value) for key, value in zip(keys, (2.7, 11.0), strict=True)]
+    shares = free_bodies.geometry_shares(bodies, bodies.body(at))
+    expected = operators(build_at(bodies, at))
+    known = [operators(build_at(bodies, each)) for each in bodies.geometries]
+    for name in "KCM":
+        parts = [s * getattr(each, name) for s, each in zip(shares, known, strict=True)]
+        A = getattr(expected, name)
+        assert abs(sum(parts) - A).max() < 1e-9 * abs(A).max()
+
+
 def test_the_ends_of_a_range_of_thickness_are_as_accurate_as_its_middle():
     thickness = 12.0
     tacton = Tacton(am_frequency=200, trajectory=Trajectory(shape="circle", size=0.01, speed=6.0))
