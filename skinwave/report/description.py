@@ -44,7 +44,7 @@ def unresolved_lines(runs: Iterable[Run]) -> list[str]:
     unresolved = {run.scene.tacton.duration: run.unresolved for run in runs if run.unresolved}
     return [
         f"A Tacton of {seconds:g} s is too short to resolve {plural(len(names), 'line')}: "
-        f"{', '.join(names[:NAMED])}{', ...' * (len(names) > NAMED)}. Make it longer to see them."
+        f"{', '.join(names[:NAMED])}{' and others' * (len(names) > NAMED)}. Use a longer Tacton."
         for seconds, names in unresolved.items()
     ]
 

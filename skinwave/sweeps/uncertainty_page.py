@@ -17,13 +17,13 @@ from skinwave.sweeps.ensemble import Ensemble, ensemble, propagate, rows_of
 from skinwave.sweeps.sampling import PERCENTILES, one_at_a_time, percentiles, sobol_indices
 from skinwave.sweeps.table_figures import axis_label, finished_rows, value
 from skinwave.sweeps.uncertainty_figures import bands_figure, maps_figure, tornado_figure
-from skinwave.system.document import Details, Part, Picture, Report, Section
+from skinwave.system.document import Choice, Details, Part, Picture, Report, Section
 from skinwave.system.table import Column, Table
 
 BANDS = (
     "Bands of the samples at each time, and bars of each line. The dark part contains half of the "
-    "samples, the whole nine of ten. Each time and each line has its own band, so no single sample "
-    "follows an edge."
+    "samples, light and dark together nine of ten. Each time and each line has its own band, so no "
+    "single sample follows an edge."
 )
 MAPS = (
     "Percentiles of the RMS motion at each place, and the share of samples in which a place is "
@@ -69,17 +69,19 @@ def _ensemble_parts(found: Ensemble, rows: Sequence[Row]) -> Iterator[Part]:
          for s in found.spreads],
     )  # fmt: skip
     varied = ensemble(found.scene, found.spreads, one_at_a_time(found.spreads), found.method)
-    yield Picture(png(bands_figure(found, varied.waveform[0])), BANDS, "bands")
+    pictures = {"bands": Picture(png(bands_figure(found, varied.waveform[0])), BANDS, "bands")}
     if found.has_map:
-        yield Picture(png(maps_figure(found)), MAPS, "bands-map")
+        pictures["maps"] = Picture(png(maps_figure(found)), MAPS, "bands-map")
     (rms, *_), ends = (name for name in rows[0] if name.startswith("rms_")), rows_of(varied)
     outputs = [f"{rms}[{p}]", *(name for name in ("level_db", ABOVE) if name in rows[0])]
     charts = {axis_label(name): np.array([value(row, name) for row in ends]) for name in outputs}
-    yield Picture(png(tornado_figure(charts, keys)), ONE_AT_A_TIME, "tornado")
+    tornado = png(tornado_figure(charts, keys))
+    pictures["one number at a time"] = Picture(tornado, ONE_AT_A_TIME, "tornado")
+    yield Choice("uncertainty", pictures)
     table, (x, y) = row_percentiles(rows), found.scene.probes[p]
     lines = [row for row in table.rows if row[1] is not None and row[2:4] == (1e3 * x, 1e3 * y)]
     lines = sorted(lines, key=lambda row: -row[MEDIAN])[:MOST_LINES]
-    yield _with_labels(Table(table.columns, lines))
+    yield Details("Percentiles of lines", [_with_labels(Table(table.columns, lines))])
 
 
 def _with_labels(table: Table) -> Table:
