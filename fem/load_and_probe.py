@@ -168,7 +168,7 @@ def _surface_frame(
         )
     if not len(nodes):
         raise ValueError("the facet set is empty; name another one")
-    owner, barycentric = _facets_below(mesh.points[nodes], points[:, :2])
+    owner, barycentric = facets_below(mesh.points[nodes], points[:, :2])
     if (outside := owner < 0).any():
         x_mm, y_mm = 1e3 * points[outside][0, :2]
         raise ValueError(
@@ -229,10 +229,10 @@ def curved_coordinates(elements: Floats, barycentric: Floats, points: Floats) ->
 
 def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> Bools:
     """Return a mask (p,) of the points (p, 2) in m that `probe_operator` accepts."""
-    return _facets_below(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
+    return facets_below(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
 
 
-def _facets_below(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
+def facets_below(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
     """Return the highest of the facets (k, a, 3) below each point (p, 2), or -1, and the
     barycentric coordinates (p, 3) there.
 

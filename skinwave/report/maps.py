@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
+from fem.load_and_probe import facets_below
 from simple_model.quantities import DISPLACEMENT, PRESSURE
 from skinwave.report.figures import REPORT, legend, panels, with_style
 from skinwave.report.palette import COLOURS, SEQUENTIAL, SIGNED, ink_colour, label
@@ -131,14 +132,10 @@ def _draw_measured(
 
 def interpolation(view: View, places: Floats) -> Callable[[Floats], Floats]:
     """Return the linear interpolation of values (s,) of a view's surface to places (..., 2)."""
-    owner = view.finder(places[..., 0], places[..., 1])
-    on = owner >= 0
-    nodes = view.upward[owner[on]]
-    corners = view.places[nodes]  # (q, 3, 2)
-    edges = corners[:, 1:] - corners[:, :1]
-    inside = (places[on] - corners[:, 0])[..., None]
-    second_third = np.linalg.solve(edges.swapaxes(-1, -2), inside)[..., 0]
-    weights = np.column_stack([1 - second_third.sum(axis=-1), second_third])
+    facets = view.points[view.surface][view.triangles]
+    owner, weights = facets_below(facets, places.reshape(-1, 2))
+    on = (owner >= 0).reshape(places.shape[:-1])
+    nodes, weights = view.triangles[owner[owner >= 0]], weights[owner >= 0]
 
     def interpolate(values: Floats) -> Floats:
         at = np.full(on.shape, np.nan)

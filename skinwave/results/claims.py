@@ -140,7 +140,7 @@ def _drawing_lines(runs: Sequence[NamedLines]) -> Assessment:
         for run in runs
         for n in (1, 2, 3)
     )
-    sentence = f"the peaks next to 1, 2 and 3 f_d deviate from them by at most {offset:.2f} Hz"
+    sentence = f"the peaks at 1, 2 and 3 f_d deviate by {_bound(offset)}"
     return offset <= ON_BIN, offset, ON_BIN, sentence if np.isfinite(offset) else NO_PEAK
 
 
@@ -207,11 +207,11 @@ def _much_lower(runs: Sequence[NamedLines]) -> Assessment:
     levels = [multiple_levels(run).max() for run in runs]
     value, lower = max(levels), sum(bool(level < MUCH_LOWER) for level in levels)
     sentence = (
-        f"the strongest multiple of f_AM or f_d is at {decibel(value, signed=True)} dB re f_AM; in "
-        f"{lower} of {plural(len(runs), 'Tacton')} all are below {MUCH_LOWER:g} dB at every probe"
+        f"the strongest multiple of f_AM or f_d is at {decibel(value, signed=True)} dB re f_AM, "
+        f"and below {MUCH_LOWER:g} dB in {lower} of {plural(len(runs), 'Tacton')}"
     )
     if value < PRESENT:
-        sentence += f"; all are below {PRESENT:g} dB, too weak to be visible"
+        sentence += "; it is too weak to be visible"
     return bool(PRESENT <= value < MUCH_LOWER), value, MUCH_LOWER, sentence
 
 
@@ -222,10 +222,12 @@ def _exact_frequencies(runs: Sequence[NamedLines]) -> Assessment:
         for name in (["f_AM"] if run.is_am else ["f_d"])
     ]
     worst = max(offsets)
-    sentence = (
-        f"the spectral peaks deviate from the commanded f_AM and f_d by at most {worst:.2f} Hz"
-    )
+    sentence = f"the spectral peaks deviate from the commanded f_AM and f_d by {_bound(worst)}"
     return worst <= ON_BIN, worst, ON_BIN, sentence if np.isfinite(worst) else NO_PEAK
+
+
+def _bound(offset: float) -> str:
+    return "less than 0.01 Hz" if offset < 0.01 else f"at most {offset:.2f} Hz"
 
 
 # Kinds of runs that claims are about: whether the amplitude is modulated, and the focus moves.

@@ -6,7 +6,7 @@ Motion is about its mean, because the mean pressure bends a sheet much more than
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -103,22 +103,6 @@ class View:
     def inward(self) -> Singles:
         """Motion (f, s) of the upper surface into the body, in SI units."""
         return -self.motion[:, self.surface, 2]
-
-    @cached_property
-    def upward(self) -> Ints:
-        """Triangles (k, 3) of the surface that face upwards; those of a steep rim may not."""
-        corners = self.places[self.triangles]
-        along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
-        return np.asarray(self.triangles[area > 1e-6 * area.max()])
-
-    @cached_property
-    def finder(self) -> Any:
-        """Function of x and y (...) in m that returns the index in `upward`, or -1."""
-        from matplotlib.tri import Triangulation
-
-        x, y = self.places.T
-        return Triangulation(x, y, self.upward).get_trifinder()
 
     @property
     def peak(self) -> float:
