@@ -16,11 +16,11 @@ from skinwave.measure.findings import cautions, notes, probability, round_to_int
 from skinwave.measure.fit import Fit
 from skinwave.measure.intervals import Estimate
 from skinwave.measure.measurement import strongest
+from skinwave.report.column_labels import axis_label
 from skinwave.report.figures import REPORT, png
 from skinwave.report.palette import BLUE, ORANGE
 from skinwave.report.spectra import lines_figure
 from skinwave.scene.file import dumps
-from skinwave.sweeps.table_figures import axis_label
 from skinwave.system.document import (
     Details,
     Part,

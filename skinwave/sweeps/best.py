@@ -15,12 +15,13 @@ from simple_model.choices import choose
 from simple_model.numbers import significant
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.limits import takes
+from skinwave.report.column_labels import at_probe
 from skinwave.scene.spreads import PRESSURE, Spread, spreads_of
 from skinwave.scene.variation import Choice, Variation, combinations
 from skinwave.sweeps.ensemble import is_linear
 from skinwave.sweeps.reductions import model_of
 from skinwave.sweeps.sweep import Combinations, Sweep
-from skinwave.sweeps.table_figures import at_probe, value
+from skinwave.sweeps.table_figures import value
 from skinwave.typing import Floats
 
 SAMPLES, FEWEST_SAMPLES = 199, 39  # by default; for a 95 % interval

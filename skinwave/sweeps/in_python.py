@@ -16,12 +16,13 @@ from simple_model.choices import choose
 from simple_model.numbers import plural
 from simple_model.response import library
 from skinwave.models.options import SolveOptions
+from skinwave.report.column_labels import axis_label
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import Choice, Variation, cases_of, combinations, parse
 from skinwave.sweeps import best
 from skinwave.sweeps.sweep import Sweep
-from skinwave.sweeps.table_figures import axis_label, curves, finished_rows, value
+from skinwave.sweeps.table_figures import curves, finished_rows, value
 from skinwave.system.effort import Progress
 from skinwave.system.progress_bar import progress_callback
 from skinwave.system.table import cell_text

@@ -1,6 +1,5 @@
 """Figures of a sweep: a column over one or two varied keys (matplotlib)."""
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +13,7 @@ from matplotlib.figure import Figure
 from simple_model.choices import choose
 from simple_model.drawing import small
 from simple_model.threshold import BAND
+from skinwave.report.column_labels import at_probe, axis_label, column_unit
 from skinwave.report.styles import Style
 from skinwave.sweeps.dataset import Row
 
@@ -22,20 +22,6 @@ MARKERS = "osD^vP*X"
 MOST_NAMED = len(MARKERS)  # curves in a legend; more numbers have a colour bar
 MOST_TICKS = 12
 LEAST_FILLED = 0.5  # share of the cells of a grid that have a run
-UNITS = {  # by the end of a column's name
-    "_m_per_s": "m/s", "_um": "µm", "_mm": "mm", "_db": "dB", "_hz": "Hz",
-    "_pa": "Pa", "_ms": "ms", "_s": "s", "_percent": "%", "_deg": "°", "_gib": "GiB", "_cm2": "cm²",
-    "_kg_m3": "kg/m³", "_pa_s": "Pa s", "seconds": "s", "_ratio": "µm/Pa, scaled",
-}  # fmt: skip
-NAMES = {
-    "peak_um": "largest displacement", "rms_um": "RMS displacement about its mean",
-    "level_db": "sensation level", "tacton.speed_m_per_s": "drawing speed",
-    "tacton.am_frequency_hz": "AM frequency", "tacton.size_mm": "size of the path",
-    "body.thickness_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
-    "spread_20db_mm": "spread to -20 dB", "kernel_misfit": "misfit to the point kernel",
-    "kernel_delay_ms": "delay behind the point kernel",
-    "expected_error": "expected error of the mesh", "above_threshold_cm2": "area above threshold",
-}  # fmt: skip
 
 
 def varied_keys(rows: Sequence[Row]) -> list[str]:
@@ -155,36 +141,10 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
     ax.grid(alpha=0.25)
 
 
-def axis_label(column: str) -> str:
-    """Return the label of an axis: the quantity of a column and its unit."""
-    name, probe = at_probe(column)
-    words = NAMES.get(name)
-    if words is None:
-        words = name.split(".", 1)[-1] if re.match(r"[a-z]+\.[a-z]", name) else name
-        for end in UNITS:
-            words = words.removesuffix(end) if words != end else words
-        words = words.replace("_kernel", " of the point kernel")
-        words = re.sub(r"(?<![a-z])(\d*f)_(AM2?|[de])(?![A-Za-z])", r"$\1_{\2}$", words)
-        words = re.sub(r"_(?!\{)", " ", words)
-    where = "" if probe is None else f" at probe {probe}"
-    return ", ".join(filter(None, (f"{words}{where}", _unit(name))))
-
-
-def _unit(name: str) -> str:
-    ends = sorted((end for end in UNITS if name.endswith(end)), key=len)
-    return UNITS[ends[-1]] if ends else ""
-
-
 def _with_unit(key: str, level: Any) -> str:
     name = axis_label(key).rpartition(", ")[0] or axis_label(key)
     text = f"{level:g}" if isinstance(level, float) else str(level)
-    return f"{name} {text} {_unit(key)}".strip()
-
-
-def at_probe(column: str) -> tuple[str, int | None]:
-    """Split a column such as "peak_um[2]" into its name and the index of the probe, or None."""
-    match = re.fullmatch(r"(.+)\[(\d+)\]", column)
-    return (match[1], int(match[2])) if match else (column, None)
+    return f"{name} {text} {column_unit(key)}".strip()
 
 
 def _check(rows: Sequence[Row], columns: Sequence[str]) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from simple_model.numbers import interval, percent, plural, significant
+from skinwave.report.column_labels import axis_label
 from skinwave.report.figures import png
 from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
@@ -15,7 +16,7 @@ from skinwave.sweeps import dataset
 from skinwave.sweeps.dataset import Row
 from skinwave.sweeps.ensemble import Ensemble, ensemble, propagate, rows_of
 from skinwave.sweeps.sampling import PERCENTILES, one_at_a_time, percentiles, sobol_indices
-from skinwave.sweeps.table_figures import axis_label, finished_rows, value
+from skinwave.sweeps.table_figures import finished_rows, value
 from skinwave.sweeps.uncertainty_figures import bands_figure, maps_figure, tornado_figure
 from skinwave.system.document import Choice, Details, Part, Picture, Report, Section
 from skinwave.system.table import Column, Table

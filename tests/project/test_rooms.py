@@ -24,8 +24,8 @@ ROOMS = {
 
 # Rooms within skinwave, in order: each imports those before it only.
 INNER = (
-    "system", "bodies", "scene", "models", "planning", "results", "report", "patterns", "sweeps",
-    "measure", "live", "verify", "studies", "commands",
+    "system", "bodies", "scene", "models", "planning", "results", "report", "patterns", "measure",
+    "sweeps", "live", "verify", "studies", "commands",
 )  # fmt: skip
 MESHES = ("surface", "shapes", "volume", "files")  # within meshes, likewise
 WITHIN = {"meshes": MESHES, "skinwave": INNER}
