@@ -140,7 +140,7 @@ class ModulusTable:
 
     Parameters
     ----------
-    frequencies : (k,) Hz, ascending and above 0; the first may be 0, with a loss modulus of 0
+    frequencies : (k,) Hz, ascending, 0 or above; the loss modulus at 0 Hz must be 0
     moduli : (k,) complex, Pa, with real parts above 0 and imaginary parts of 0 or above
 
     Raises a ValueError if they are not those of a passive, causal solid.

@@ -329,8 +329,8 @@ def _check_points(path: Trajectory) -> None:
         raise ValueError("points and centre must be pairs of numbers, such as (0.01, 0)") from None
     if places.shape[1:] != (2,) or not (np.abs(places) <= FARTHEST_POINT).all():
         raise ValueError(
-            f"points and centre must be pairs within ±{1e3 * FARTHEST_POINT:g} mm, where devices "
-            "steer to; move or shrink the path"
+            f"points and centre must be pairs within ±{1e3 * FARTHEST_POINT:g} mm, the reach of "
+            "devices; move or shrink the path"
         )
 
 

@@ -166,7 +166,7 @@ def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
     lines = load_lines(measured, aim)
     if lines.unresolved:
         names = first_names(lines.unresolved)
-        raise ValueError(f"the record is too short to resolve {names}; fit waveforms from rest")
+        raise ValueError(f"the record is too short to resolve {names}; use --to waveforms")
     if not lines.names:
         raise ValueError("the measurement resolves no line of the scene's load; check the Tacton")
     amplitudes = lines.measured

@@ -85,7 +85,7 @@ class Target:
         return replace(changed, probes=tuple(places), depth=0.0, quantity=self.quantity.name)
 
     def factor(self, values: Values) -> float:
-        """Return the factor of the linear keys."""
+        """Return the factor of the linear keys on predictions."""
         key, strength = self.strength
         relative = values[key] / strength if self._is_scaled(values) else 1.0
         return float(values.get(GAIN, 1.0) * relative)
@@ -181,7 +181,7 @@ def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
         raise ValueError(
             f"the load has no line at the measured {frequencies[apart][0]:.1f} Hz if "
             f"{', '.join(f'{key} = {value:g}' for key, value in values.items())}; do not vary keys "
-            "that change its lines, or fit waveforms from rest"
+            "that change its lines, or use --to waveforms"
         )
     return np.asarray(a[at])
 

@@ -282,6 +282,8 @@ def _fill(row: Floats, gap: np.ndarray) -> float:
         error = float(np.sqrt(np.mean(np.square(away)))) / size if size > 0 else 0.0
     if not error <= LARGEST_GAP_ERROR:
         missing = f"{int(gap.sum())} samples are missing, up to {longest} in a row"
-        raise ValueError(f"{missing}, too many to interpolate; choose other --columns or a part")
+        raise ValueError(
+            f"{missing}, too many to interpolate; choose other --columns, or cut the rows"
+        )
     row[gap] = CubicSpline(known, row[known])(np.flatnonzero(gap))
     return error

@@ -281,7 +281,7 @@ def _series(table: Table, motion: list[int], is_complex: bool) -> Series:
             raise ValueError(f"the column '{parts[0]}' is of a spectrum; add the column 'f [Hz]'")
         return [(columns[k], table.numbers[:, k]) for k in motion]
     if len(motion) % 2:
-        raise ValueError("a spectrum needs two columns per place, re and im, or abs and phase")
+        raise ValueError("give two columns per place for a spectrum: re and im, or abs and phase")
     pairs = zip(motion[::2], motion[1::2], strict=True)
     return [(columns[k], _complex(table, k, other)) for k, other in pairs]
 

@@ -178,12 +178,14 @@ def _check_alike(motion: list[Function]) -> None:
     step = 1e-3 * abs(first.x[1] - first.x[0])
     for one in motion[1:]:
         if len(one.y) != len(first.y) or not np.allclose(one.x, first.x, rtol=1e-6, atol=step):
-            raise ValueError("sets 58 differ in times or frequencies; export them with the same")
+            raise ValueError(
+                "datasets 58 differ in times or frequencies; export them with equal ones"
+            )
         for key in ("quantity", "unit", "type"):
             values = getattr(first, key), getattr(one, key)
             if values[0] != values[1]:
                 each = ", ".join(map(str, values))
-                raise ValueError(f"sets 58 differ in {key}: {each}; give --quantity")
+                raise ValueError(f"datasets 58 differ in {key}: {each}; give --quantity")
 
 
 def _by_node(motion: list[Function]) -> list[tuple[int, list[Function]]]:

@@ -203,7 +203,7 @@ def plain_limits(scene: Scene) -> Iterator[Limit]:
 
 
 def surface_limits(scene: Scene) -> Iterator[Limit]:
-    """Yield the same limits for models that also compute the rates of this displacement."""
+    """Yield the limits of models of the surface displacement and its rates under a focus."""
     if not (scene.reading.record.is_normal and scene.reading.is_on_surface):
         yield reading_limit(scene)
     if not scene.load.is_plain:

@@ -335,7 +335,7 @@ STRETCHED = register(
         FROM_REST,
         name="plate-modes-nonlinear",
         method="large deflection of a thin plate in its modes, from rest",
-        words="a thin plate that stretches as it bends, in its modes by Ritz's method, from rest",
+        words="a thin plate in bending and stretching, from rest, with modes by Ritz's method",
         solve=stretched_answer,
         seconds=5.0,
         memory=4e8,

@@ -32,8 +32,7 @@ SAME_LOAD = register(
         name="point-kernel",
         label="kernel, same load",
         method="point kernel",
-        words="the pressure weighted by the distance to the moving focus, in Pa; nothing "
-        "propagates",
+        words="the local pressure in Pa, from the distance to the moving focus; nothing propagates",
         solve=_same_load,
         error=lambda scene, h: ERROR,
         colour="#000000",
@@ -47,8 +46,8 @@ PUBLISHED = register(
         SAME_LOAD,
         name="point-kernel-published",
         label="kernel, as published",
-        words="the point kernel under the load of Lim, Seifi and Park: the commanded signal "
-        "itself, without a mean",
+        words="the point kernel with the load of Lim, Seifi and Park (the commanded signal "
+        "without its mean)",
         solve=_solve_published,
         colour="#999999",
     )

@@ -52,7 +52,7 @@ class ErrorBudget:
     def words(self) -> str:
         """All three errors in one sentence."""
         return (
-            f"Uncertainty of the waveform at the worst probe (standard deviation): {self.spreads}; "
+            f"Standard deviation of the waveform at the worst probe: {self.spreads}; "
             f"numerical error {stated_error(self.numerical)}"
         )
 

@@ -50,7 +50,9 @@ def total_warning(parts: Sequence[ErrorPart], error: float, tolerance: float) ->
     if not error > tolerance or any(part.error > tolerance for part in parts):
         return ()
     cure = max(parts, key=lambda part: part.error).cure
-    return part_warnings([ErrorPart(source="all errors", error=error, cure=cure)], tolerance)
+    return part_warnings(
+        [ErrorPart(source="all errors together", error=error, cure=cure)], tolerance
+    )
 
 
 def stretching_part(scene: Scene, model: Model, tolerance: float) -> ErrorPart:

@@ -231,7 +231,7 @@ def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
     return highest, PlanRow(
         what="highest line",
         value=f"{highest:.0f} Hz",
-        reason=f"of {len(spectrum[0])} lines of the load; higher lines move the probes by less "
+        reason=f"the load has {len(spectrum[0])} lines; higher ones move the probes by less "
         f"than {percent(tolerance / 3)}",
     )
 

@@ -37,7 +37,7 @@ def element_rows(
         PlanRow(
             what="cost",
             value=f"{sum(effort.seconds.values()):.1f} s, {effort.peak_memory / 2**30:.1f} GiB",
-            reason=f"of the last mesh{cached}; each further Tacton on this body takes 0.05 s",
+            reason=f"for the last mesh{cached}; each further Tacton on this body takes 0.05 s",
         ),
     ]
 
@@ -70,7 +70,7 @@ def _size_row(mesh: Refined, tolerance: float, h: float | None) -> PlanRow:
     reason = (
         "the only mesh of the file, so its error is unknown"
         if np.isnan(mesh.error)
-        else f"{why}; the error is {change_text(mesh.error)} by comparison with elements of "
+        else f"{why}; mesh error {change_text(mesh.error)}, by comparison with elements of "
         f"{1e3 * mesh.compared:.2f} mm"
     )
     size = f"{1e3 * mesh.h:.2f} mm, {mesh.prepared.effort.dofs:,} dofs"

@@ -131,7 +131,7 @@ def _draw_measured(
 
 
 def interpolation(view: View, places: Floats) -> Callable[[Floats], Floats]:
-    """Return the linear interpolation of values (s,) of a view's surface to places (..., 2)."""
+    """Return the function of surface values (s,) that interpolates them at places (..., 2)."""
     facets = view.points[view.surface][view.triangles]
     owner, weights = facets_below(facets, places.reshape(-1, 2))
     on = (owner >= 0).reshape(places.shape[:-1])

@@ -198,7 +198,7 @@ def _am_highest_measured(runs: Sequence[NamedLines]) -> Assessment:
         sentence += f"; f_AM is exceeded in {names}"
     if runs[0].is_motion:  # a vibrometer reads velocity; the point kernel has no velocity
         velocity = max(rival_levels(run, velocity=True).max() for run in runs)
-        sentence += f"; as velocity the strongest rival is at {decibel(velocity, signed=True)} dB"
+        sentence += f"; strongest rival in velocity: {decibel(velocity, signed=True)} dB"
         value = max(value, velocity)
     return holds and value < 0, value, bar, sentence
 
@@ -264,7 +264,7 @@ TEXTS = {
     "S4": "Simulated, AM+STM: f_AM is the highest line, whatever the path.",
     "S5": "Both: lines exactly at the commanded f_AM and f_d.",
     "M1": "Measured, AM alone: lines at multiples of f_AM.",
-    "M2": "Measured, STM alone: lines at the same places for every path with the same f_d.",
+    "M2": "Measured, STM alone: the same lines for every path with the same f_d.",
     "M3": "Measured, AM+STM: lines at multiples of both f_AM and f_d.",
     "M4": "Measured, AM+STM: f_AM is the highest line, whatever the path.",
     "M5": "Measured, AM+STM: the multiples of f_AM and f_d are much lower than f_AM.",

@@ -12,7 +12,7 @@ PATHS = ((0.0, 0.0), (0.010, 6.0), (0.020, 12.0), (0.030, 18.0))  # circle diame
 
 
 def tactons() -> Iterator[tuple[str, Tacton]]:
-    """Yield the name and Tacton of the 3 PureAM, 3 PureSTM and 9 AM+STM patterns of 1 s."""
+    """Yield names and Tactons of the 3 PureAM, 3 PureSTM and 9 AM+STM patterns of 1 s."""
     for am_frequency in AM_FREQUENCIES:
         for size, speed in PATHS:
             parts = [f"am{am_frequency:g}"] if am_frequency else []

@@ -108,7 +108,7 @@ function showMessages() {
   const problem = [...errors.values()].find(Boolean) ?? "";
   const { title, error } = answer?.body ?? {};
   const accuracy = error && !answer.invalid
-    ? `${title}: lines differ from the full model by at most ${rounded(100 * error, 2)} %` : "";
+    ? `${title}: error of the lines at most ${rounded(100 * error, 2)} %` : "";
   const warnings = [...new Set([...(answer?.body.warnings ?? []), ...(answer?.warnings ?? [])])];
   $("problem").textContent = problem;
   $("notice").textContent = problem ? "" : notice || accuracy;

@@ -47,16 +47,16 @@ LINE_COLUMNS = (
     Column("mach_angle_deg", "Mach angle", "degrees", 2),
 )  # fmt: skip
 CAPTION = (
-    "Modes of the laterally infinite body. Strong lines: energy propagates. Pale lines: the mode "
-    "is evanescent. It decays to 1/e within a quarter of its wavelength, or its energy moves at "
-    "less than a twentieth of its phase speed. Dotted: lines of the load; dashed: speed of the "
+    "Modes of the laterally infinite body. Strong lines: energy propagates. Pale lines: "
+    "evanescent mode (1/e length below a quarter of its wavelength, or energy speed below a "
+    "twentieth of its phase speed). Dotted: lines of the load; dashed: speed of the "
     "focus. The group speed is left out where loss distorts a wave packet (imaginary part of dk/dω "
     "above the real part)."
 )
 EXPLAINED = (
-    "The driven mode of a line is the propagating mode that moves the surface most at the edge of "
-    "the main lobe of the focal spot, or an evanescent one if none propagates. Its share is "
-    "relative to the sum of the magnitudes of all modes there. On a straight path, a focus that is "
+    "The driven mode of a line moves the surface most at the edge of the main lobe of the focal "
+    "spot. Evanescent modes count only if none propagates. Its share is its magnitude over the sum "
+    "of all magnitudes there. On a straight path, a focus that is "
     "faster than a wave leaves a wake at the Mach angle asin(c/v). On a path as small as a "
     "wavelength, no such wake forms."
 )
@@ -212,7 +212,7 @@ def _line_sentence(line: DrivenLine) -> str:
     if not line.focus_speed:
         return text
     ratio = significant(line.focus_speed / line.phase_speed)
-    text += f" The focus moves at {significant(line.focus_speed)} m/s, {ratio} times as fast"
+    text += f" The focus moves at {significant(line.focus_speed)} m/s, {ratio} times as fast as it"
     if line.mach_angle is None:
         return f"{text}."
     return f"{text}; the Mach angle on a straight path is {line.mach_angle:.0f}°."

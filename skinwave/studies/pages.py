@@ -58,13 +58,13 @@ NAMED = 3  # lines that a sentence names
 NO_MOTION = "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
 ABOUT_MAPS = (
     "Shares and spreads come from maps that reach 44 mm from the origin along x and y. The map of "
-    "a slab is that of a laterally infinite layer. For other bodies only the first Tacton has a "
-    "map. The strongest component has the largest amplitude at any probe. Its phase delay is known "
+    "a slab is that of a laterally infinite layer. For other bodies only the Tacton above has a "
+    "map. The strongest component is the largest over all probes. Its phase delay is known "
     "up to whole periods, and includes the phase lag of the body."
 )
 WAVEFORMS = "Waveforms and spectra; each row is a probe."
 LOADS = (
-    "The published kernel has the load of the paper: a linear drive and a sinc² main lobe. All "
+    "The published kernel has its published load: a linear drive and a sinc² main lobe. All "
     "other models have the load of the scene."
 )
 SENSATION = (
@@ -302,7 +302,7 @@ def _drive_sentence(kernel: Run, published: Run) -> str:
     if not names:
         return f"{law.capitalize()} change amplitudes of lines and add none."
     added = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
-    return f"The lines {added} come from {law}; linear propagation adds none."
+    return f"{law.capitalize()} make the lines {added}. Linear propagation adds none."
 
 
 def _uncertainty(first: FirstScreen) -> str:

@@ -51,8 +51,8 @@ TURNED = (
 )
 MARKS = "Black: path and focus; yellow: probes."
 COMPARED = (
-    "Colour: motion into the body about its mean, or pressure of the point kernel, over each "
-    "model's largest value. All models receive the same load."
+    "Colour: motion into the body (mean removed) or pressure of the kernel, relative to the "
+    "largest value of each model. All models receive the same load."
 )
 SNAPSHOTS = (
     "The surface when the body moves most, then at quarters of a turn of the focus, or of a period "
@@ -208,7 +208,7 @@ def _plan_parts(album: Album) -> list[Part]:
         return ["These results contain no plan. skinwave plan SCENE makes one."]
     heading = (
         f"Plan for a relative error of {100 * planned['tolerance']:g} % at the probes. Pictures "
-        "show the whole body, by finite elements or the modes of a plate."
+        "show the whole body, by finite elements (sheets: by plate modes)."
     )
     rows = [[row["what"], row["value"], row["reason"]] for row in planned["rows"]]
     parts: list[Part] = [heading, Table(["", "", "reason"], rows)]

@@ -23,8 +23,8 @@ ROUND_OFF = 1e-3  # ms, or of a misfit
 MOST_LINES = 12  # in a table
 NEGLIGIBLE_LINE_RATIO = 1e-9  # to the strongest line
 LEVELS = (
-    "Levels are relative to f_AM at the same probe. The highest level over the probes is given; "
-    "f_AM may be weak there."
+    "Levels are relative to f_AM at the same probe, where it may be weak: the highest over the "
+    "probes, the lowest over the Tactons."
 )
 AGREEMENT = (
     "Tacton", "what changes", "models", "waveform misfit at the best scale",

@@ -92,7 +92,7 @@ def _with_labels(table: Table) -> Table:
 
 
 def sentences(found: Ensemble) -> list[str]:
-    """State number of samples and method, and the 90 % intervals of the motion and its level."""
+    """State the method, the number of samples, and 90 % intervals of motion and level."""
     n, d = found.values.shape
     p, quantity = found.strongest, found.scene.reading.record
     x, y = (1e3 * z for z in found.scene.probes[p])
