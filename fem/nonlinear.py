@@ -161,9 +161,9 @@ def dynamic(
     ----------
     body : Elastic
     force : function of the time in s that returns nodal forces (3 n,) in N
-    dt : time step, s
+    dt : float, s, time step
     initial : state with initial displacement and velocity; at rest by default
-    tolerance : largest last correction of a step's displacement, relative to it
+    tolerance : float, last Newton correction relative to the displacement of the step
     solver : backend of `factorise`
 
     Yields

@@ -111,7 +111,7 @@ class FractionalZener:
         )
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> FractionalZener:
-        """Return the law with all moduli, or their relaxing part, multiplied by a factor."""
+        """Multiply all moduli by `modulus`, and their relaxing part also by `loss`."""
         rest, fast = modulus * self.shear_modulus, self.fast_modulus - self.shear_modulus
         return replace(self, shear_modulus=rest, fast_modulus=rest + modulus * loss * fast)
 

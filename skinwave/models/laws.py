@@ -33,8 +33,8 @@ def has_table(body: Body) -> bool:
 
 
 def check_laws(body: Body, pressure: MovingPressure) -> None:
-    """Raise a ValueError for a modulus law that is not passive or not causal, or a table that does
-    not cover the strong lines of the load, except the mean; below them an octave may be missing.
+    """Raise a ValueError for a modulus law that is not passive or not causal, or a table that ends
+    below the highest strong line of the load or begins an octave above the lowest, mean ignored.
     """
     for solid in own_laws(body):
         solid.series()

@@ -138,8 +138,8 @@ def prepare(
     Raises
     ------
     ValueError
-        If a key cannot be free, the probes' quantity depends on it not only through the motion, or
-        the tolerance cannot be reached.
+        If a key cannot be free or changes the probes' quantity directly, or the tolerance cannot
+        be reached.
 
     Examples
     --------

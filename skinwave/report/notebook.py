@@ -59,7 +59,7 @@ def plan_line(plan: "Plan") -> str:
 
 
 def agreement_line(agreement: "Agreement") -> str:
-    """Describe misfits, scale and number of lines in one line."""
+    """Describe misfits, scale and number of spectral lines."""
     probes = plural(len(agreement.probes), "probe")
     parts = [
         f"relative L2 misfit {_range(agreement.relative_l2)}",

@@ -123,7 +123,7 @@ def maps_figure(found: Ensemble) -> Figure:
 
 
 def tornado_figure(outputs: Mapping[str, Floats], keys: Sequence[str]) -> Figure:
-    """Draw tornado charts of outputs (1 + 2 d,) at samples of `one_at_a_time` of d keys."""
+    """Draw tornado charts of outputs (1 + 2 d,) at the `one_at_a_time` samples of d keys."""
     with mpl.rc_context(REPORT.rc):
         figure = Figure(figsize=REPORT.size(10.5, 1.2 + 0.35 * len(keys)), layout="constrained")
         axes = figure.subplots(1, len(outputs), squeeze=False)[0]

@@ -100,7 +100,7 @@ def case(
 def relative(
     what: str, value: ArrayLike, reference: ArrayLike, bar: float, unit: str = ""
 ) -> Check:
-    """Check the relative error of a number, or the largest of several numbers, by magnitude.
+    """Check the relative error of a number, or the largest such error of several numbers.
 
     All checks take SI units; `unit` is that of the page.
     """
