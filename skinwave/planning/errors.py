@@ -8,6 +8,7 @@ import numpy as np
 
 from skinwave.models import Model, named
 from skinwave.models.laws import own_laws, series_tolerance
+from skinwave.models.limits import takes
 from skinwave.models.plate_modes import STRETCHED
 from skinwave.models.reduced import BAND, ReducedBody
 from skinwave.models.relative_change import change_text
@@ -57,10 +58,12 @@ def total_warning(parts: Sequence[ErrorPart], error: float, tolerance: float) ->
 
 def stretching_part(scene: Scene, model: Model, tolerance: float) -> ErrorPart:
     """Return the part due to stretching, which a linear model of a sheet leaves out."""
+    cure = "use a thicker sheet or a lower pressure"
     return ErrorPart(
         source=f"stretching, which {model.name} leaves out",
-        error=stretching_error(scene, model, tolerance), cure=f"use --model {STRETCHED.name}",
-    )  # fmt: skip
+        error=stretching_error(scene, model, tolerance),
+        cure=f"use --model {STRETCHED.name}" if takes(STRETCHED, scene) else cure,
+    )
 
 
 def element_parts(
