@@ -38,6 +38,7 @@ from simple_model.load.tacton import (
 from simple_model.load.trajectory import SHAPES, Trajectory, even_phases, joined
 from simple_model.point_kernel import point_kernel, point_kernel_published, published_load
 from simple_model.response import Effort, Response, are_resolved, lines, phasors, spectrum
+from simple_model.statement import ErrorPart, Statement
 from simple_model.threshold import sensation_level, threshold
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "SUPERPOSITIONS",
     "DriveLaw",
     "Effort",
+    "ErrorPart",
     "FractionalKelvinVoigt",
     "FractionalZener",
     "LineTable",
@@ -60,6 +62,7 @@ __all__ = [
     "Rhythm",
     "Signal",
     "Stack",
+    "Statement",
     "Tacton",
     "Trajectory",
     "Unnamed",

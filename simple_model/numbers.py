@@ -76,6 +76,11 @@ def share_of(ratio: float, whole: str) -> str:
     return f"{significant(ratio, 2)} times {whole}" if ratio > 1 else f"{percent(ratio)} of {whole}"
 
 
+def change_text(change: float) -> str:
+    """Format a relative change of a waveform in percent, or as a factor if it is above 100 %."""
+    return percent(change) if change <= 1 else f"{significant(change, 2)} times the waveform"
+
+
 def plural(number: int, thing: str) -> str:
     """Format a number of things.
 

@@ -14,9 +14,10 @@ from simple_model import drawing
 from simple_model.load.line_names import line_names
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
-from simple_model.numbers import plural, significant, stated_error
+from simple_model.numbers import plural, significant
 from simple_model.quantities import DISPLACEMENT, PRESSURE, NotApplicable, Quantity, quantity
 from simple_model.spectra import Lines, Spectrum, cosines
+from simple_model.statement import Statement
 from simple_model.typing import Bools, Complex, Floats, Ints
 
 if TYPE_CHECKING:
@@ -42,7 +43,8 @@ class Effort:
     bytes; element size `h` in m and time step `dt` in s, 0 if there is none; SHA-256 of the `mesh`;
     `solver`; `estimate` of the relative error of the reduction; relative `energy_imbalance`; share
     of the losses that was `radiated` through absorbing boundaries; `versions` of the software;
-    `warnings`, sentences on the limits of the result.
+    `errors`, the statement of the expected error; `warnings`, sentences on the limits of the
+    result.
     """
 
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -59,6 +61,7 @@ class Effort:
     energy_imbalance: float = 0.0
     radiated: float = 0.0
     versions: Mapping[str, str] = field(default_factory=dict)
+    errors: Statement = field(default_factory=Statement)
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -77,7 +80,6 @@ class Response:
     values : (t, p) float, in the unit of the quantity
     quantity : a name in `quantities.QUANTITIES`; normal motion is positive into the body
     effort : Effort
-    expected_error : float, estimated before the run, relative to the waveforms; nan if unknown
     load : MovingPressure that defines the `lines`; None if unknown
 
     The arrays are copied and read-only. Raises a ValueError if shapes do not fit, if a number is
@@ -96,7 +98,6 @@ class Response:
     values: Floats
     quantity: str = DISPLACEMENT.name
     effort: Effort = field(default_factory=Effort)
-    expected_error: float = np.nan
     load: MovingPressure | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -113,6 +114,13 @@ class Response:
     def record(self) -> Quantity:
         """The record of its quantity."""
         return quantity(self.quantity)
+
+    @property
+    def expected_error(self) -> float:
+        """Expected relative error of the worst probe's waveform, from `effort.errors`; inf if
+        unknown.
+        """
+        return self.effort.errors.error
 
     @property
     def unit(self) -> str:
@@ -174,7 +182,7 @@ class Response:
         )
         frame.attrs = {
             "units": self.unit, "quantity": self.quantity, "model": self.model,
-            "expected_error": float(self.expected_error), "warnings": self.effort.warnings,
+            "expected_error": self.expected_error, "warnings": self.effort.warnings,
         }  # fmt: skip
         return frame
 
@@ -185,7 +193,7 @@ class Response:
         parts = [
             f"{record.words} ({size}) from {1e3 * times[0]:g} to {1e3 * times[-1]:.5g} ms, at most "
             f"{significant(largest)} {record.shown}",
-            f"expected error {stated_error(self.expected_error)}",
+            f"expected error {self.effort.errors.words}",
             plural(len(self.effort.warnings), "warning"),
         ]
         return f"<Response of {self.model}: {'; '.join(parts)}>"

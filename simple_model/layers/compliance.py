@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -65,19 +66,33 @@ def half_space(material: Material, *, poisson: float | None = None) -> Complianc
     return Compliance(compliance)
 
 
+def thick_plate(kd: Any, poisson: float) -> tuple[Any, Any]:
+    """Return factors of the bending stiffness and of the mass of a thin plate, for shear and rotary
+    inertia at wavenumbers times thickness `kd` (...).
+
+        1 / (1 + a), 1 + b / (1 + a),  a = (k d)^2 / (6 kappa (1 - nu)),  b = (k d)^2 / 12
+
+    with the shear factor kappa = 5/6: the first branch of Mindlin's plate (Mindlin, J Appl Mech
+    18:31 (1951)).
+    """
+    shear = 1 + kd**2 / (5 * (1 - poisson))
+    return 1 / shear, 1 + kd**2 / 12 / shear
+
+
 def thin_sheet(
     material: Material,
     thickness: float,
     *,
     air_density: float = AIR_DENSITY,
     tension: float = 0.0,
+    correction: Callable[[Complex, float], tuple[Any, Any]] = lambda kd, poisson: (1.0, 1.0),
 ) -> Compliance:
     """Return the compliance of an infinite thin sheet with air on both sides.
 
         G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2],  m = rho d,  D* = mu* d^3 / 6 (1 - nu)
 
     for a thickness d in m, a tension T in N/m and an air density in kg/m3. Its static deflection is
-    unbounded, so G = 0 at w = 0.
+    unbounded, so G = 0 at w = 0. The `correction` returns factors of D* and m, as `thick_plate`.
     """
     mass_per_area = material.density * thickness
 
@@ -85,8 +100,10 @@ def thin_sheet(
         return np.asarray(material.complex_modulus(w) * thickness**3 / (6 * (1 - material.poisson)))
 
     def compliance(k: Complex, w: Complex) -> Complex:
-        inertia = (mass_per_area + 2 * air_density / k) * w**2
-        return np.where(w == 0, 0, 1 / (bending(w) * k**4 + tension * k**2 - inertia))
+        softer, heavier = correction(k * thickness, material.poisson)
+        inertia = (heavier * mass_per_area + 2 * air_density / k) * w**2
+        stiffness = softer * bending(w) * k**4 + tension * k**2
+        return np.where(w == 0, 0, 1 / (stiffness - inertia))
 
     def clearance(w: Complex) -> float:
         companion = np.zeros((len(w), 5, 5), np.complex128)

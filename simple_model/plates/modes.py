@@ -17,7 +17,7 @@ modes most.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from typing import Any
@@ -182,6 +182,23 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
             f"degrees of freedom, more than {MOST_DOFS:,}; lower finest = {max(resolved):g}"
         )
     return PlateModes(plate=plate, families=tuple(_family(plate, x, y) for x, y in product(*bases)))
+
+
+def scaled_modes(modes: PlateModes, *, bending: Floats, mass: Floats) -> PlateModes:
+    """Return modes whose stiffness of bending is multiplied by `bending` (m,) and whose modal mass
+    by `mass` (m,), again of unit modal mass.
+    """
+    families, first = [], 0
+    for family in modes.families:
+        part = slice(first, first := first + len(family.squared))
+        softer, heavier, share = bending[part], mass[part], family.elastic
+        root = np.sqrt(softer / heavier)
+        families.append(replace(
+            family, squared=family.squared * (1 - share + share * softer) / heavier,
+            bending=None if family.bending is None else root[:, None] * family.bending * root,
+            shapes=family.shapes / np.sqrt(heavier),
+        ))  # fmt: skip
+    return replace(modes, families=tuple(families))
 
 
 def modal_motion(

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import partial
 from math import pi, sqrt
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -99,11 +100,13 @@ def check_isotropic(body: Body) -> None:
         )
 
 
-def compliance(body: Body) -> Compliance:
-    """Return the compliance of an infinite sheet, with properties averaged over directions."""
+def compliance(body: Body, **correction: Any) -> Compliance:
+    """Return the compliance of an infinite sheet, with properties averaged over directions, and
+    with the `correction` of `thin_sheet`, if one is given.
+    """
     return thin_sheet(
         body.solid, body.depth, air_density=AIR_DENSITY if body.air else 0.0,
-        tension=body.mounting.mean_tension,
+        tension=body.mounting.mean_tension, **correction,
     )  # fmt: skip
 
 

@@ -6,7 +6,6 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -131,12 +130,9 @@ def warn(sentences: Iterable[str]) -> None:
 
 
 def accuracy(response: "Response") -> dict[str, Any]:
-    """Return the expected error and the warnings of a response for a summary in JSON."""
-    error = response.expected_error
-    return {
-        "expected_error": error if isfinite(error) else None,
-        "warnings": list(response.effort.warnings),
-    }
+    """Return the expected error, its parts and the warnings of a response for a summary in JSON."""
+    effort = response.effort
+    return {**effort.errors.summary(), "warnings": list(effort.warnings)}
 
 
 def check_seed(seed: int) -> None:

@@ -68,7 +68,9 @@ def run(options: argparse.Namespace) -> int:
         "solver": effort.solver, "seconds": round(sum(effort.seconds.values()), 2),
     }  # fmt: skip
     summarise(
-        options, summary | accuracy(response), f"{response.model}: wrote {options.out}/index.html"
+        options,
+        summary | accuracy(response),
+        f"{response.model}: wrote {options.out}/index.html; expected error {effort.errors.words}",
     )
     return 0
 

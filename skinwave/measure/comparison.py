@@ -104,7 +104,8 @@ class MeasuredComparison:
     def is_numerical(self, column: ModelColumn) -> np.ndarray:
         """Return a mask (f, p) of differences within the expected numerical error of a model."""
         away = np.abs(self.lines.mean - column.model)
-        error = np.nan_to_num(column.run.response.expected_error)
+        error = column.run.response.expected_error
+        error = error if np.isfinite(error) else 0.0
         return np.asarray(away <= error * np.linalg.norm(column.model, axis=0))
 
     def findings(self, column: ModelColumn) -> np.ndarray:
@@ -252,8 +253,8 @@ def in_quantity(run: Run, quantity: str, prepared: Mapping[str, ReducedBody]) ->
         response = answer(replace(prepared[run.column], reading=scene.reading), scene)
     else:
         response = compute(scene, run.model)
-    response = replace(response, expected_error=run.response.expected_error)
-    return replace(run, scene=scene, response=response)
+    effort = replace(response.effort, errors=run.response.effort.errors)
+    return replace(run, scene=scene, response=replace(response, effort=effort))
 
 
 def measured_places(comparison: MeasuredComparison) -> MeasuredPlaces:

@@ -6,13 +6,12 @@ Importing this package loads no numerical library, because the command line list
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
-from math import nan
 from typing import TYPE_CHECKING
 
 from skinwave.system import extensions
 
 if TYPE_CHECKING:
-    from simple_model import Response
+    from simple_model import ErrorPart, Response
     from skinwave.bodies import Body
     from skinwave.models.options import SolveOptions
     from skinwave.scene.scene import Scene
@@ -63,8 +62,8 @@ class Model:
         response
     limits : function of a scene with a body that yields each `Limit` that it exceeds; by default
         the model computes only the displacement of the surface under a pressure
-    error : function of scene and element size in m that returns the expected relative error, or
-        nan; None for linear waves, whose error a plan estimates
+    parts : function of scene and element size in m that yields each `ErrorPart` of the model
+        itself; a plan adds what the model leaves out of the scene. By default nothing is known
     default_size : function of a body that returns its element size in m; None without a mesh
     seconds, memory : predicted cost of a first response, s and bytes, unless a plan measures it
     colour : str, for figures
@@ -84,7 +83,7 @@ class Model:
     words: str
     solve: "Callable[[Scene, Floats, SolveOptions], Response]"
     limits: "Callable[[Scene], Iterable[Limit]] | None" = None
-    error: "Callable[[Scene, float | None], float] | None" = lambda scene, h: nan
+    parts: "Callable[[Scene, float | None], Iterable[ErrorPart]] | None" = None
     default_size: "Callable[[Body], float] | None" = None
     seconds: float = 0.1
     memory: float = 1e8
@@ -99,6 +98,11 @@ class Model:
     is_stepped: bool = False
     is_nonlinear: bool = False
     takes_series: "Callable[[Body], bool]" = lambda body: False
+
+    @property
+    def is_refined(self) -> bool:
+        """Whether a plan refines its mesh, and estimates its error from two meshes."""
+        return self.default_size is not None and not self.is_nonlinear
 
     @property
     def is_steady(self) -> bool:

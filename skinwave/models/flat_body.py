@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 import simple_model
-from simple_model import Effort, Response
+from simple_model import Effort, ErrorPart, Response
+from simple_model.layers.compliance import thick_plate
 from simple_model.layers.flat_body import field_history, steady_history
 from simple_model.layers.flat_quantities import quantity_field, surface_field, traction_field
 from simple_model.layers.wavenumber_integral import Field
 from simple_model.load.focus import gaussian_width
+from simple_model.quantities import DISPLACEMENT
+from skinwave.bodies import sheet
 from skinwave.bodies.analytic import compliance, stack
 from skinwave.bodies.parts import FLAT
 from skinwave.models import Limit, Model, register
@@ -24,7 +27,9 @@ from skinwave.models.limits import (
     of_part,
     reading_limit,
 )
-from skinwave.models.options import SolveOptions, response_of
+from skinwave.models.options import SolveOptions, response_of, sample_times
+from skinwave.models.plate_modes import without_shear
+from skinwave.models.relative_change import relative_changes
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -33,6 +38,8 @@ LAYERS = (
     "Society of America 71 (1981) 1743-1761"
 )
 STEP = "wavenumber integral"
+INTEGRAL_ERROR = 0.002  # compared with finite elements
+SHEARED_DURATION = 0.1  # s of the responses of a thin and a thick sheet that are compared
 Solve = Callable[[Scene, Floats, SolveOptions], Response]
 
 
@@ -75,6 +82,29 @@ def field_read(scene: Scene, depth: float) -> Field:
     if scene.body.of_kind.is_layer:
         return quantity_field(scene.reading.record, stack(scene.body), depth)
     return surface_field(scene.reading.record, compliance(scene.body))
+
+
+def _parts(scene: Scene, h: float | None) -> Iterator[ErrorPart]:
+    """Yield the parts of the error of a wavenumber integral, compared with finite elements."""
+    yield ErrorPart(
+        name="integral", source="the wavenumber integral", error=INTEGRAL_ERROR,
+        cure=f"use a tolerance of {100 * INTEGRAL_ERROR:g} % or more",
+    )  # fmt: skip
+    if scene.body.of_kind.is_plate:
+        times = sample_times(scene)
+        times = times[: max(2, np.searchsorted(times, SHEARED_DURATION))]
+        thin, thick = (
+            field_history(
+                surface_field(DISPLACEMENT, each), scene.pressure, scene.probe_points, times
+            )
+            for each in (
+                sheet.compliance(scene.body),
+                sheet.compliance(scene.body, correction=thick_plate),
+            )
+        )
+        yield without_shear(
+            scene, float(relative_changes((thick - thin)[..., 0], thick[..., 0]).max())
+        )
 
 
 def _limits(scene: Scene) -> Iterator[Limit]:
@@ -131,7 +161,7 @@ FLAT_BODY = register(
         words="linear waves of a laterally infinite flat body, by the wavenumber integral",
         solve=_solver("flat-body", simple_model.flat_body, field_history),
         limits=_limits,
-        error=None,
+        parts=_parts,
         seconds=2.0,
         memory=3e8,
         colour="#009E73",

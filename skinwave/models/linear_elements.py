@@ -305,7 +305,6 @@ FEM = register(
         method="10-node tetrahedra, reduced-order model",
         words="linear waves on 10-node tetrahedra by a reduced-order model",
         solve=_solve_reduced,
-        error=None,
         default_size=default_size,
         limits=partial(_limits, frame_air_limits, True),
         colour="#0072B2",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import nan
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,12 +79,12 @@ def solver_name(solver: str) -> str:
 
 
 def response_of(
-    scene: Scene, model: str, times: Floats, values: Floats, effort: Effort, error: float = nan
+    scene: Scene, model: str, times: Floats, values: Floats, effort: Effort
 ) -> Response:
-    """Return the response for a scene's quantity, with an error measured by the model."""
+    """Return the response for a scene's quantity."""
     return Response(
         model=model, times=times, probes=scene.probe_points, quantity=scene.quantity,
-        values=values, effort=effort, expected_error=error,
+        values=values, effort=effort,
     )  # fmt: skip
 
 

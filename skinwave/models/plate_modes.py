@@ -3,12 +3,16 @@ steady state, from rest, and at large deflection by von Karman's equations.
 
 At large deflection, the motion without stretching is that of `plate-modes-transient`, with all
 modes and without time steps. Time steps of the lowest modes add the effect of stretching. The
-numbers of steps and modes follow from the tolerance and from two errors over the first part of each
-response: that of the steps, by halving them, and that of the modes, by using fewer.
+numbers of steps and modes follow from the tolerance and from two errors: that of the steps, by
+comparison with steps twice as long, and that of the modes, by using fewer. They are chosen for the
+first part of a response, and confirmed by the whole.
+
+A thin plate has no shear and no rotary inertia. Their effect on the motion of each mode, by
+`thick_plate`, is part of the expected error.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from itertools import pairwise
@@ -19,8 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.reduced import exponential_sum
-from simple_model import Effort, MovingPressure, Response
-from simple_model.layers.compliance import AIR_DENSITY
+from simple_model import Effort, ErrorPart, Response, Statement
+from simple_model.layers.compliance import AIR_DENSITY, thick_plate
 from simple_model.load.sampling import below_half_the_rate, highest_driving, step
 from simple_model.load.spectrum import lines_from_rest, synthesise
 from simple_model.plates.free_modes import free_modes
@@ -31,22 +35,29 @@ from simple_model.plates.modes import (
     modal_motion,
     modal_motion_apart,
     plate_modes,
+    scaled_modes,
 )
 from simple_model.plates.path_forces import modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate, karman_plate
 from skinwave.bodies.body import Body
 from skinwave.bodies.supports import EDGES
-from skinwave.models import Limit, Model, register
+from skinwave.models import Limit, Model, named, register
 from skinwave.models.laws import has_own_law, slowest_and_fastest
-from skinwave.models.limits import clamped_sheet_limits, of_body, surface_limits
+from skinwave.models.limits import clamped_sheet_limits, of_body, surface_limits, takes
 from skinwave.models.options import SolveOptions, response_of, sample_times
 from skinwave.models.relative_change import relative_changes
 from skinwave.scene.scene import Scene
-from skinwave.system.effort import peak_memory
+from skinwave.system.effort import Progress, peak_memory, silent
 from skinwave.typing import Complex, Floats
 
 PLATES = "A. W. Leissa: Vibration of Plates. NASA SP-160, 1969"
-ERROR = 0.01  # relative, of a steady waveform, by finite elements of a frame, vacuum and air
+ERROR = ErrorPart(  # of a steady waveform, by finite elements of a frame, vacuum and air
+    name="modes", source="Ritz's method", error=0.01, cure="use a larger tolerance"
+)
+# Error of a thin plate over the effect of shear and rotary inertia: 0.6 to 1.3 for plates of 0.04
+# to 0.2 times their side, simply supported or clamped, by finite elements.
+CLAMPED = 1.5
+DETUNING = 1e-3  # of natural frequencies, for the sensitivity
 KARMAN = (
     "S. Bilbao, O. Thomas, C. Touze, M. Ducceschi: Conservative numerical methods for the full von "
     "Karman plate equations. Numerical Methods for Partial Differential Equations 31 (2015) "
@@ -54,7 +65,7 @@ KARMAN = (
 )
 LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
 COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number compared with the one before
-CHECKED_DURATION = 0.2  # s of a response, at least, over which errors are measured
+FIRST_DURATION = 0.2  # s of a response, at least, for which steps and modes are chosen
 SHARE = 0.3  # of the tolerance, for steps and for modes
 DEGREE = 5  # of the splines that are differentiated
 
@@ -106,7 +117,7 @@ class Driven:
 
 def steady_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Solve the steady state of the modes for all lines below half the sampling rate."""
-    started, driven = time.perf_counter(), _drive(scene, times, options)
+    started, driven = time.perf_counter(), _drive(scene, times, options.progress)
     return _response(scene, times, MODES.name, driven, _steady(scene, driven, times), started)
 
 
@@ -115,7 +126,7 @@ def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Co
     steady state, at places (p, 2) in m or at its probes. Raises a ValueError if the load has no
     lines.
     """
-    driven = _drive(scene, sample_times(scene), SolveOptions())
+    driven = _drive(scene, sample_times(scene))
     if places is not None:
         outputs = driven.modes.at(places - scene.body.placement.offset)
         driven = replace(driven, outputs=outputs)
@@ -124,23 +135,84 @@ def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Co
 
 def answer_from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Solve the steady state and the free vibration after a start from rest."""
-    started, driven = time.perf_counter(), _drive(scene, times, options)
-    values = _steady(scene, driven, times) + _free_vibration(scene, driven, times)
+    started, driven = time.perf_counter(), _drive(scene, times, options.progress)
+    values = _from_rest(scene, driven, times)
     return _response(scene, times, FROM_REST.name, driven, values, started)
 
 
-def _drive(scene: Scene, times: Floats, options: SolveOptions) -> Driven:
+def thin_plate_part(scene: Scene) -> ErrorPart:
+    """Return the part of the error that is due to shear and rotary inertia."""
+    return without_shear(scene, CLAMPED * effect_of(_shear_and_inertia, scene))
+
+
+def without_shear(scene: Scene, error: float) -> ErrorPart:
+    """Return the part of the error of a thin plate."""
+    cure = "use --model fem" if takes(named("fem"), scene) else "use a thinner sheet"
+    source = "shear and rotary inertia, which a thin plate leaves out"
+    return ErrorPart(name="thin plate", source=source, error=error, cure=cure)
+
+
+def sensitivity(scene: Scene) -> float:
+    """Return the relative change of the waveforms per relative change of natural frequencies."""
+    return effect_of(_detuned, scene) / DETUNING
+
+
+Factors = tuple[Floats | float, Floats | float]  # of the stiffness of bending and of modal mass
+
+
+@lru_cache(maxsize=64)
+def effect_of(change: Callable[[Body, PlateModes], Factors], scene: Scene) -> float:
+    """Return the relative change of the motion from rest with other modes, without coupling.
+
+    `change` returns the factors (m,) of a body's modes.
+    """
+    times, modulus = sample_times(scene), partial(relative_modulus, scene.body)
+    driven, values = _uncoupled(scene)
+    count = len(driven.modes.squared)
+    bending, mass = (np.broadcast_to(f, count) for f in change(scene.body, driven.modes))
+    modes = scaled_modes(driven.modes, bending=bending, mass=mass)
+    forces, outputs = (each / np.sqrt(mass) for each in (driven.forces, driven.outputs))
+    motion = modal_motion_apart(modes, driven.frequencies, forces, modulus)
+    other = replace(driven, modes=modes, forces=forces, outputs=outputs, motion=motion)
+    changed = _from_rest(scene, other, times)
+    return float(relative_changes(changed - values, changed).max())
+
+
+def _shear_and_inertia(body: Body, modes: PlateModes) -> Factors:
+    bent = np.maximum(modes.squared * modes.elastic, 0.0)
+    k = np.asarray((bent * body.mass_per_area / body.bending_stiffness) ** 0.25)
+    return thick_plate(k * body.depth, body.solid.poisson)
+
+
+def _detuned(body: Body, modes: PlateModes) -> Factors:
+    return 1.0, (1 + DETUNING) ** -2
+
+
+@lru_cache(maxsize=2)
+def _uncoupled(scene: Scene) -> tuple[Driven, Floats]:
+    """Return the motion from rest (t, p) without coupling between modes, and its modes."""
+    times = sample_times(scene)
+    driven = _drive(scene, times, motion=modal_motion_apart)
+    return driven, _from_rest(scene, driven, times)
+
+
+def _drive(
+    scene: Scene,
+    times: Floats,
+    progress: Progress = silent,
+    motion: Callable[..., Complex] = modal_motion,
+) -> Driven:
     body, pressure = scene.body, scene.pressure
-    options.progress("modes", 0.0)
+    progress("modes", 0.0)
     modes: PlateModes = modes_of(plate_of(body))
-    options.progress("lines", 0.0)
+    progress("lines", 0.0)
     middle = body.placement.offset
     f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
     driving = f < highest_driving(pressure, times)
     f, forces = f[driving], forces[driving]
     return Driven(
         modes=modes, frequencies=f, forces=forces, outputs=modes.at(scene.probe_points - middle),
-        motion=modal_motion(modes, f, forces, partial(relative_modulus, body)),
+        motion=motion(modes, f, forces, partial(relative_modulus, body)),
     )  # fmt: skip
 
 
@@ -152,6 +224,11 @@ def _response(
         steps=len(driven.frequencies), peak_memory=peak_memory(),
     )  # fmt: skip
     return response_of(scene, model, times, values, effort)
+
+
+def _from_rest(scene: Scene, driven: Driven, times: Floats) -> Floats:
+    """Return the motion from rest (t, p)."""
+    return _steady(scene, driven, times) + _free_vibration(scene, driven, times)
 
 
 def _steady(scene: Scene, driven: Driven, times: Floats) -> Floats:
@@ -205,7 +282,7 @@ MODES = register(
         words="the steady state of a thin plate, in its modes by Ritz's method",
         solve=steady_answer,
         limits=limits,
-        error=lambda scene, h: ERROR,
+        parts=lambda scene, h: [ERROR, thin_plate_part(scene)],
         seconds=0.5,
         memory=2e8,
         colour="#F0E442",
@@ -232,22 +309,22 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
     started = time.perf_counter()
     linear = FROM_REST.solve(scene, times, options)
     modes: PlateModes = modes_of(plate_of(scene.body))
-    options.progress("large deflection", 0.0)
-    count, parts, error = _resolution(scene, times, options, modes, linear.values)
-    options.progress("large deflection", 0.2)
-    values = linear.values + _stretching(scene, times, modes, count, parts)
+    found = _stretch(scene, times, options, modes, linear.values)
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
-        reduced_dofs=count, steps=parts * (len(times) - 1), dt=step(times) / parts,
-        peak_memory=peak_memory(),
+        reduced_dofs=found.count, steps=found.parts * (len(times) - 1),
+        dt=step(times) / found.parts, peak_memory=peak_memory(),
+        errors=Statement(
+            parts=(ERROR, thin_plate_part(scene), *found.errors), tolerance=options.tolerance
+        ),
     )  # fmt: skip
-    return response_of(scene, STRETCHED.name, times, values, effort, ERROR + error)
+    return response_of(scene, STRETCHED.name, times, linear.values + found.values, effort)
 
 
-def first_part(pressure: MovingPressure, times: Floats) -> Floats:
-    """Return the times (s,) in s in which errors are measured."""
-    slowest, _ = slowest_and_fastest(pressure)
-    return times[: max(2, round(max(CHECKED_DURATION, 1 / slowest) / step(times)) + 1)]
+def first_part(scene: Scene, times: Floats) -> Floats:
+    """Return the times (s,) in s for which steps and modes are chosen."""
+    slowest, _ = slowest_and_fastest(scene.pressure)
+    return times[: max(2, round(max(FIRST_DURATION, 1 / slowest) / step(times)) + 1)]
 
 
 def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
@@ -266,41 +343,85 @@ def steady_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Plate
     options = SolveOptions(tolerance=tolerance)
     modes: PlateModes = modes_of(plate_of(scene.body))
     linear = FROM_REST.solve(scene, times, options).values
-    count, parts, _ = _resolution(scene, times, options, modes, linear)
+    start = first_part(scene, times)
+    found = _resolve(scene, start, options, modes, linear[: len(start)])
     later = slice(len(times) // 2, None)
     middle = scene.body.placement.offset
     z = linear_motion(modes, scene.pressure, scene.body.solid, times[later], middle=middle)
-    plate, stretching = _stretching_coordinates(scene, times, modes, count, parts)
-    z[:, plate.chosen] += stretching[::parts][later]
+    plate, stretching = _stretching_coordinates(scene, times, modes, found.count, found.parts)
+    z[:, plate.chosen] += stretching[:: found.parts][later]
     return times[later], z - z.mean(axis=0), modes
 
 
-def _resolution(
-    scene: Scene, times: Floats, options: SolveOptions, modes: PlateModes, linear: Floats
-) -> tuple[int, int, float]:
-    """Return the numbers of stretching modes and of time steps per sample, and the resulting error
-    in the first part of a response, within the tolerance if possible.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stretching:
+    """What stretching adds to a response, `values` (t, p), with `count` modes, and `parts` time
+    steps for each sample, and the `errors` of both.
     """
-    sample = step(times)
-    parts = ceil(sample / (options.dt or LONGEST) - 1e-9)
+
+    values: Floats
+    count: int
+    parts: int
+    errors: tuple[ErrorPart, ...]
+
+
+def _stretch(
+    scene: Scene, times: Floats, options: SolveOptions, modes: PlateModes, linear: Floats
+) -> Stretching:
+    """Return what stretching adds to a linear response (t, p), within the tolerance if possible.
+
+    The whole record is solved with what its first part needs, and with more if that is too little:
+    a resonance may build up slowly, and errors grow with it.
+    """
+    start = first_part(scene, times)
+    options.progress("large deflection", 0.0)
+    found = _resolve(scene, start, options, modes, linear[: len(start)])
+    if len(start) < len(times):
+        options.progress("large deflection", 0.2)
+        found = _resolve(scene, times, options, modes, linear, (found.count, found.parts))
+    return found
+
+
+def _resolve(
+    scene: Scene, times: Floats, options: SolveOptions, modes: PlateModes, linear: Floats,
+    least: tuple[int, int] = (0, 1),
+) -> Stretching:  # fmt: skip
+    """Return what stretching adds, with at least the given numbers of modes and of parts."""
+    sample, allowed = step(times), SHARE * options.tolerance
     counts = [min(count, len(modes.squared)) for count in COUNTS]
-    start = first_part(scene.pressure, times)
-    stretching = cache(lambda count, parts: _stretching(scene, start, modes, count, parts))
+    # A record of few samples cannot have longer steps.
+    parts = max(least[1], 1 + (len(times) <= 4 * DEGREE))
+    parts = max(parts, ceil(sample / (options.dt or LONGEST) - 1e-9))
+    solved = cache(lambda count, parts: _stretching(scene, times, modes, count, parts))
+
+    def change(other: Floats, values: Floats, stride: int = 1) -> float:
+        whole = (linear + values)[::stride]
+        return float(relative_changes(values[::stride] - other, whole).max())
+
     for fewer, count in pairwise(counts):
+        if count < least[0]:
+            continue
         while True:
-            part = stretching(count, parts)
-            size = linear[: len(start)] + part
-            # Steps are of second order: a quarter of the error with steps half as long.
-            change = relative_changes(stretching(count, 2 * parts) - part, size)
-            by_steps = 4 / 3 * float(change.max())
-            by_modes = float(relative_changes(stretching(fewer, parts) - part, size).max())
-            may_be_shorter = options.dt is None and sample / parts > SHORTEST
-            if by_steps <= SHARE * options.tolerance or not may_be_shorter:
+            values = solved(count, parts)
+            if parts > 1:
+                longer, stride, ratio = solved(count, parts // 2), 1, parts / (parts // 2)
+            else:
+                longer, stride, ratio = _stretching(scene, times[::2], modes, count, 1), 2, 2.0
+            by_steps = change(longer, values, stride) / (ratio**2 - 1)  # of second order
+            if by_steps <= allowed or options.dt or sample / parts <= SHORTEST:
                 break
             parts *= 2
-        if by_modes <= SHARE * options.tolerance:
+        by_modes = change(solved(fewer, parts), values)
+        if by_modes <= allowed:
             break
-    return count, parts, by_steps + by_modes
+    cure = "use a lower pressure, or a material with more loss"
+    errors = (
+        ErrorPart(name="steps", source=f"time steps of {1e3 * sample / parts:.3g} ms",
+                  error=by_steps, cure=f"use --dt {sample / parts / 2:.2g}, or {cure[4:]}"),
+        ErrorPart(name="stretching modes", source=f"{count} modes that stretch", error=by_modes,
+                  cure=cure),
+    )  # fmt: skip
+    return Stretching(values=values, count=count, parts=parts, errors=errors)
 
 
 def _stretching(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int) -> Floats:

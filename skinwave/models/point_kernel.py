@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from simple_model import Response, point_kernel, point_kernel_published
+from simple_model import ErrorPart, Response, point_kernel, point_kernel_published
 from simple_model.quantities import PRESSURE
 from skinwave.models import Limit, Model, register
 from skinwave.models.limits import load_limit
@@ -11,7 +11,9 @@ from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
-ERROR = 1.0  # relative error of the point kernel on any body, measured 0.98 to 1.04
+NO_WAVES = ErrorPart(  # on any body, measured 0.98 to 1.04
+    name="no waves", source="the point kernel", error=1.0, cure="use a model with waves"
+)
 
 
 def _same_load(scene: Scene, times: Floats, options: SolveOptions) -> Response:
@@ -34,7 +36,7 @@ SAME_LOAD = register(
         method="point kernel",
         words="the local pressure in Pa, from the distance to the moving focus; nothing propagates",
         solve=_same_load,
-        error=lambda scene, h: ERROR,
+        parts=lambda scene, h: [NO_WAVES],
         colour="#000000",
         limits=_limits,
         quantity=PRESSURE.name,

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from simple_model.numbers import percent, significant
 from skinwave.typing import Array, Floats
 
 NO_MOTION = 1e-9  # of the probe that moves most: weaker motion is round-off
@@ -13,8 +12,3 @@ def relative_changes(change: Array, values: Array) -> Floats:
     sizes = np.linalg.norm(values, axis=0)
     floor = max(NO_MOTION * float(sizes.max()), 1e-300)
     return np.asarray(np.linalg.norm(change, axis=0) / np.maximum(sizes, floor))
-
-
-def change_text(change: float) -> str:
-    """Return a relative change in percent, or as a factor if it is above 100 %."""
-    return percent(change) if change <= 1 else f"{significant(change, 2)} times the waveform"

@@ -24,7 +24,7 @@ import fem
 from fem import nonlinear
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from meshes import middle_plane
-from simple_model import Effort, Material, Response
+from simple_model import Effort, ErrorPart, Material, Response, Statement
 from simple_model.load.sampling import below_half_the_rate, highest_driving, resolving_step
 from simple_model.load.spectrum import load_lines
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
@@ -62,6 +62,12 @@ MOST_LINES = 500  # of a load that are summed in each step
 def stretching_size(body: Body, *, reduced: bool) -> float:
     """Return the default element size in m of a sheet at large deflection."""
     return min(body.width, body.height) / (REDUCED_CELLS if reduced else FULL_CELLS)
+
+
+def mesh_part(h: float, error: float) -> ErrorPart:
+    """Return the part of the error that is due to elements of h in m."""
+    source = f"elements of {1e3 * h:.3g} mm"
+    return ErrorPart(name="mesh", source=source, error=error, cure="use smaller elements")
 
 
 def expected_error(body: Body, h: float) -> float:
@@ -114,11 +120,13 @@ def full_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
         stepped, dt, times, scene, (scene.body.solid,) * len(scene.probes)
     )
     normal = _normal_scene(scene)
-    error = _plate_error(
+    part = _plate_part(
         normal, times, options, linear_elements.in_time(straight, dt, times, normal), size
     )
-    effort = with_cost(replace(effort, dofs=len(body.operators.free)), clock, made, size)
-    return response_of(scene, "fem-nonlinear-transient", times, values, effort, error)
+    errors = Statement(parts=(part,), tolerance=options.tolerance)
+    effort = replace(effort, dofs=len(body.operators.free), errors=errors)
+    effort = with_cost(effort, clock, made, size)
+    return response_of(scene, "fem-nonlinear-transient", times, values, effort)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -165,16 +173,21 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
         )
         shapes = fem.probe_operator(sheet.made.mesh, probes) @ sheet.modes.basis
         normal_motion = _from_rest(motion, shapes, times, normal.reading.record, ())
-        elements = _plate_error(normal, times, options, normal_motion, size)
+        elements = _plate_part(normal, times, options, normal_motion, size)
     # The linear part has no step error; that of stretching is proportional to stretching.
     share = np.minimum(relative_changes(values - linear, values), 1)
-    error = elements + float((share * relative_changes(straight - linear, values)).max())
+    steps = ErrorPart(
+        name="steps", source=f"time steps of {1e3 * dt:.3g} ms",
+        error=float((share * relative_changes(straight - linear, values)).max()),
+        cure="use a shorter --dt",
+    )  # fmt: skip
     effort = replace(
         effort, dofs=len(sheet.operators.free), reduced_dofs=len(sheet.modes.hz),
         estimate=sheet.modes.left_out,
+        errors=Statement(parts=(elements, steps), tolerance=options.tolerance),
     )  # fmt: skip
     effort = with_cost(effort, clock, sheet.made, size)
-    return response_of(scene, "fem-nonlinear", times, values, effort, error)
+    return response_of(scene, "fem-nonlinear", times, values, effort)
 
 
 def _modal_force(
@@ -262,14 +275,16 @@ def _normal_scene(scene: Scene) -> Scene:
     return replace(scene, quantity=RATES[rate].name, depth=0.0)
 
 
-def _plate_error(
+def _plate_part(
     normal: Scene, times: Floats, options: SolveOptions, linear: Floats, h: float
-) -> float:
+) -> ErrorPart:
     """Return the error of a linear part (t, p) of normal motion, compared with a thin plate."""
-    if limits.beyond(FROM_REST, normal):
-        return expected_error(normal.body, h)
-    plate = FROM_REST.solve(normal, times, options).values
-    return float(relative_changes(linear - plate, plate).max()) + PLATE_ERROR
+    error = expected_error(normal.body, h)
+    if not limits.beyond(FROM_REST, normal):
+        plate = FROM_REST.solve(normal, times, options).values
+        measured = float(relative_changes(linear - plate, plate).max())
+        error = max(error, measured + PLATE_ERROR.error)
+    return mesh_part(h, error)
 
 
 def _limits(
@@ -294,7 +309,7 @@ REDUCED = register(
         words="a sheet that stretches as it bends, in its modes, from rest",
         solve=reduced_answer,
         limits=partial(_limits, limits.frame_air_limits, REDUCED_SIZE),
-        error=lambda scene, h: expected_error(scene.body, h or 0.0),
+        parts=lambda scene, h: [mesh_part(h or 0.0, expected_error(scene.body, h or 0.0))],
         default_size=REDUCED_SIZE,
         sources=(NEWMARK, NEWTON),
         is_nonlinear=True,

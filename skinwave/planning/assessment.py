@@ -5,10 +5,9 @@ is compared with the next coarser one. A default size is compared with one of tw
 costs a tenth as much and overestimates errors by up to a half.
 """
 
-from dataclasses import replace
 from functools import lru_cache
 
-from simple_model import Response
+from simple_model import Response, Statement
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
 from skinwave.models.options import DEFAULT, SolveOptions
@@ -16,7 +15,7 @@ from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.planning import errors, refinement
 from skinwave.planning.extent import absorbing_error
 from skinwave.planning.plan import plan
-from skinwave.planning.plan_warnings import response_warnings
+from skinwave.planning.plan_warnings import response_warnings, stated
 from skinwave.scene.scene import Body, Scene, without_tacton
 from skinwave.typing import Array
 
@@ -55,18 +54,9 @@ def assess(
         absorbing=absorbing_error(scene, body, options),
         above_band=refinement.above_band(response.values, response.times[1] - response.times[0]),
     )  # fmt: skip
-    series = errors.series_part(scene, response.model, tolerance, coarse)
-    parts += [series] if series else []
-    stretching = errors.stretching_part(scene, named(response.model), tolerance)
-    error = errors.total_error([*parts, stretching])
-    warnings = (
-        *errors.element_warnings(scene, size, mesh),
-        *errors.part_warnings(parts, tolerance),
-        *errors.total_warning([*parts, stretching], error, tolerance),
-        *response_warnings(scene, response, mesh, tolerance),
-    )
-    effort = replace(response.effort, warnings=warnings)
-    return replace(response, expected_error=error, effort=effort)
+    parts += errors.left_out_parts(scene, named(response.model), tolerance, coarse)
+    statement = Statement(parts=tuple(parts), tolerance=tolerance)
+    return stated(scene, response, statement, errors.element_warnings(scene, size))
 
 
 def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
@@ -83,12 +73,13 @@ def all_warnings(
     these are warnings that do not depend on their error, for other models those of the plan.
     """
     if named(response.model).default_size and h:
-        warnings, predicted = errors.element_warnings(scene, h, 0.0), 0.0
+        warnings = errors.element_warnings(scene, h)
     else:
         options = SolveOptions(tolerance=tolerance, model=response.model, times=response.times)
         planned = plan(scene, options)
-        warnings, predicted = planned.warnings, planned.error
-    return (*warnings, *response_warnings(scene, response, predicted, tolerance))
+        statement = planned.statement.with_parts(response.effort.errors.parts)
+        warnings = (*statement.warnings, *planned.cautions)
+    return (*warnings, *response_warnings(scene, response))
 
 
 def _coarser_size(body: Body, h: float) -> float:

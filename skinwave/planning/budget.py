@@ -17,12 +17,12 @@ import numpy as np
 
 from simple_model.layers.compliance import layered
 from simple_model.layers.flat_body import steady_lines
-from simple_model.numbers import significant, stated_error
+from simple_model.numbers import change_text, significant, stated_error
 from skinwave.bodies.analytic import flat_layers
 from skinwave.models.limits import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
-from skinwave.models.relative_change import change_text, relative_changes
+from skinwave.models.relative_change import relative_changes
 from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import CONTROLLER, element_sizes
 from skinwave.scene.distributions import Spread

@@ -25,7 +25,7 @@ from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies.analytic import compliance
 from skinwave.bodies.sizes import coarsest_size, default_size
 from skinwave.bodies.supports import FRAME
-from skinwave.models import Model, named
+from skinwave.models import Model, named, plate_modes
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
 from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions, sample_times
@@ -49,9 +49,12 @@ LATER_SHARE = 0.02  # of the energy of a start: what may follow the compared sam
 NO_START = 1e-6  # of the largest probe's motion: weaker motion is round-off
 EXACT = SolveOptions(tolerance=1e-3)  # of the models that are compared
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet may be taken as linear
-# Relative error of linear bending over (w / h)^2: 0.4 to 3.3 for paper sheets of 30 to 210 mm, on
-# four edges, two or in clips, with tension and without; 7 with a tenth of their loss.
+# Relative error of linear bending over (w / h)^2 away from a resonance: 0.4 to 3.3 for paper sheets
+# of 30 to 210 mm, on four edges, two or in clips, with tension and without.
 STEEPEST = 7.0
+# Relative change of natural frequencies over (w / h)^2, under a mean deflection w: 0.7 of a clamped
+# plate, 2.6 of a simply supported one.
+HARDENING = 2.6
 NEGLIGIBLE = 0.1  # of the tolerance, of an error that is bounded rather than measured
 COARSENING = 2.0  # of the default element size
 DETUNING = 0.010  # relative excess of the natural frequencies of the coarse mesh
@@ -127,26 +130,26 @@ def linear_deflection(scene: Scene) -> float:
     flat = body.of_kind.is_plate and not body.mounting.is_curled
     if not (flat and body.sides == "clamped"):
         return 0.0
-    return max(_first_deflection(_displacement_scene(scene)), mean_sag(scene) / body.depth)
+    return max(_largest_deflection(_displacement_scene(scene)), mean_sag(scene) / body.depth)
 
 
 @lru_cache(maxsize=64)
-def _first_deflection(scene: Scene) -> float:
-    """Return the largest deflection over thickness in the first part of a response, or 0."""
+def _largest_deflection(scene: Scene) -> float:
+    """Return the largest deflection over thickness in a response from rest, or 0."""
     middle = tuple(float(x) for x in scene.body.placement.offset)
     with_middle = replace(
         scene, probes=tuple(dict.fromkeys((*scene.probes, (middle[0], middle[1]))))
     )
     if not takes(FROM_REST, with_middle):
         return 0.0
-    u = FROM_REST.solve(with_middle, _first_times(with_middle), SolveOptions()).values
+    u = FROM_REST.solve(with_middle, sample_times(scene), SolveOptions()).values
     return float(np.abs(u).max()) / scene.body.depth
 
 
 @lru_cache(maxsize=64)
-def _measured_linear_error(scene: Scene) -> float:
-    """Return the relative error of linear bending in the first part of a displacement."""
-    times = _first_times(scene)
+def _measured_linear_error(scene: Scene, samples: int) -> float:
+    """Return the relative error of linear bending in the first samples of a displacement."""
+    times = sample_times(scene)[:samples]
     return linear_error(scene, times, FROM_REST.solve(scene, times, SolveOptions()).values)
 
 
@@ -155,32 +158,47 @@ def _displacement_scene(scene: Scene) -> Scene:
     return replace(scene, quantity=DISPLACEMENT.name, depth=0.0, name="", spreads=())
 
 
-def _first_times(scene: Scene) -> Floats:
-    return first_part(scene.pressure, sample_times(scene))
-
-
 def stretching_error(scene: Scene, model: Model, tolerance: float) -> float:
     """Return the error of a linear model for a sheet that stretches; 0 for other models and bodies.
 
     If the deflection is small, its square bounds the error. Otherwise `plate-modes-nonlinear`
-    measures it in the displacement, if this model takes the scene.
+    measures it in the displacement over the whole record, if this model takes the scene.
     """
     is_linear = model.needs_body and not model.is_nonlinear
     if not (is_linear and scene.body.of_kind.is_plate):
         return 0.0
-    bound = STEEPEST * linear_deflection(scene) ** 2
+    bound = _stretching_bound(scene)
     plain = _displacement_scene(scene)
     if bound > NEGLIGIBLE * tolerance and takes(STRETCHED, plain):
-        return _measured_linear_error(plain)
+        return _measured_linear_error(plain, len(sample_times(plain)))
     return min(1.0, bound)
 
 
-def beyond_linear(scene: Scene, tolerance: float) -> bool:
-    """Whether a sheet stretches or deflects too much for a linear model."""
+def _stretching_bound(scene: Scene) -> float:
+    """Return a bound of the relative error of linear bending at small deflection: stretching raises
+    natural frequencies by at most `HARDENING` (w / h)^2, and a resonance multiplies this.
+    """
+    plain = _displacement_scene(scene)
+    squared = linear_deflection(scene) ** 2
+    if not squared or not takes(FROM_REST, plain):
+        return STEEPEST * squared
+    return squared * max(STEEPEST, HARDENING * plate_modes.sensitivity(plain))
+
+
+def stretches(scene: Scene, tolerance: float) -> float:
+    """Return the error of a linear model of a sheet if it stretches or deflects too much for one,
+    otherwise 0. The first part of the record decides, if it suffices.
+    """
     if not takes(STRETCHED, scene):
-        return False
+        return 0.0
+    plain, times = _displacement_scene(scene), sample_times(scene)
+    if _stretching_bound(scene) > NEGLIGIBLE * tolerance:
+        error = _measured_linear_error(plain, len(first_part(plain, times)))
+        if error > tolerance / 2:
+            return error
     error = stretching_error(scene, FROM_REST, tolerance)
-    return error > tolerance / 2 or linear_deflection(scene) > LINEAR
+    is_beyond = error > tolerance / 2 or linear_deflection(scene) > LINEAR
+    return error if is_beyond else 0.0
 
 
 def deflection_ratio(scene: Scene, response: Response) -> float:

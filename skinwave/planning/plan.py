@@ -8,9 +8,10 @@ from functools import lru_cache
 import numpy as np
 
 import fem
+from simple_model import ErrorPart, Statement
 from simple_model.layers.flat_body import TRANSFORM_RATE
 from simple_model.load.sampling import resolving_step
-from simple_model.numbers import percent, significant
+from simple_model.numbers import change_text, percent, significant
 from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Limit, Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
@@ -18,21 +19,18 @@ from skinwave.models.laws import check_laws, own_laws, series_tolerance
 from skinwave.models.limits import beyond, check_takes, default_model, refusal, takers, takes
 from skinwave.models.linear_elements import FEM, TRANSIENT_RATE, step_count
 from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_times
-from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED
+from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED, thin_plate_part
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import answer
-from skinwave.models.relative_change import change_text
 from skinwave.planning import errors, estimates, left_out
-from skinwave.planning.errors import ErrorPart
 from skinwave.planning.extent import absorbing_error, extent, symmetry
-from skinwave.planning.plan_warnings import NO_ERROR
 from skinwave.planning.record import Plan, PlanRow
 from skinwave.planning.refinement import above_band, refine
 from skinwave.planning.rows import element_rows, neglected_rows
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
-INTEGRAL_ERROR = 0.002  # of a wavenumber integral, compared with finite elements
+THE_LOAD = ErrorPart(name="load", source="the pressure at the probes", error=0.0)
 Grid = tuple[Floats, int]  # see `sample_grid`
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
 REQUESTED = "as requested"
@@ -98,23 +96,36 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     model: flat-body-harmonic
     """
     request = _choose_model(scene, options, sample_grid(scene, options.times))
+    model, tolerance = request.model, options.tolerance
     if not scene.body.of_kind.discretise:
-        row = request.model_row()
-        return Plan(model=request.model.name, body=scene.body, rows=(row,), options=options)
-    if request.model.error:
-        planned, parts = _plan_known_error(request)
-    elif request.model.is_infinite:
-        planned, parts = _plan_wavenumber_integral(request)
-    else:
-        planned, parts = _plan_elements(request)
-    tolerance = options.tolerance
-    stretching = errors.stretching_part(scene, request.model, tolerance)  # has its own warning
-    error = planned.error + stretching.error
-    warnings = (
-        *planned.warnings, *errors.part_warnings(parts, tolerance),
-        *errors.total_warning([*parts, stretching], error, tolerance),
-    )  # fmt: skip
-    return replace(planned, error=error, warnings=warnings, options=options)
+        statement = Statement(parts=(THE_LOAD,), tolerance=tolerance)
+        return Plan(
+            model=model.name, body=scene.body, rows=(request.model_row(), _error_row(statement)),
+            statement=statement, options=options,
+        )  # fmt: skip
+    planned, parts = (_plan_elements if model.is_refined else _plan_without_mesh)(request)
+    scene = replace(scene, body=planned.body)
+    parts += errors.left_out_parts(scene, model, tolerance, planned.prepared)
+    statement = Statement(parts=tuple(parts), tolerance=tolerance)
+    rows = (*planned.rows, *_law_rows(scene, model, tolerance), _error_row(statement))
+    return replace(planned, statement=statement, rows=rows, options=options)
+
+
+def _error_row(statement: Statement) -> PlanRow:
+    """Return the row of the expected error: its parts, and what reduces the largest."""
+    return PlanRow(what="expected error", value=statement.words, reason=statement.cure)
+
+
+def _law_rows(scene: Scene, model: Model, tolerance: float) -> list[PlanRow]:
+    """Return the rows of modulus laws that Prony series replace."""
+    laws = own_laws(scene.body) if model.takes_series(scene.body) else []
+    return [
+        PlanRow(
+            what="modulus law", value=solid.series(series_tolerance(tolerance)).words,
+            reason=f"replaces the law in {model.name}",
+        )
+        for solid in laws
+    ]  # fmt: skip
 
 
 def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
@@ -150,14 +161,14 @@ def model_from_rest(scene: Scene, options: SolveOptions = DEFAULT) -> tuple[Mode
     tolerance = options.tolerance
     if options.h is not None and scene.body.of_kind.is_plate and takes(FEM, scene):
         return FEM, _why_elements(scene)
-    if left_out.beyond_linear(scene, tolerance):
-        stretching = left_out.stretching_error(scene, FROM_REST, tolerance)
+    if stretching := left_out.stretches(scene, tolerance):
         return STRETCHED, (
             f"a linear sheet would deflect by {significant(left_out.linear_deflection(scene), 2)} "
             f"thicknesses, and stretching changes its motion by {change_text(stretching)}"
         )
     reflections = _reflections(scene)
-    if reflections <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene):
+    is_infinite = reflections <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene)
+    if is_infinite and (scene.body.of_kind.is_layer or _suffices(FLAT_BODY, scene, tolerance)):
         if scene.body.sides == "absorbing":
             return FLAT_BODY, "flat layers with absorbing sides, which need no mesh"
         return FLAT_BODY, f"reflections from the sides are only {percent(reflections)}"
@@ -194,11 +205,17 @@ def _steady_start(scene: Scene, tolerance: float, grid: Grid) -> float | None:
 def why_modes(scene: Scene, tolerance: float) -> str:
     """Return the reason to use plate modes instead of elements; "" if elements are better."""
     body = scene.body
-    if not takes(FROM_REST, scene) or tolerance < ERROR:
+    if not takes(FROM_REST, scene) or not _suffices(FROM_REST, scene, tolerance):
         return ""
     if body.air and not body.mounting.is_frame:
         return f"elements include air only around a sheet in a frame, not one {body.mounting.words}"
     return "a flat sheet with clamped sides, whose modes need no mesh"
+
+
+def _suffices(model: Model, scene: Scene, tolerance: float) -> bool:
+    """Whether the own error of a model is within the tolerance, or elements cannot replace it."""
+    own = Statement(parts=errors.own_parts(model, scene, None))
+    return own.error <= tolerance or not takes(FEM, scene)
 
 
 def _why_elements(scene: Scene) -> str:
@@ -206,6 +223,8 @@ def _why_elements(scene: Scene) -> str:
     if limits := beyond(FLAT_BODY, scene):
         return f"{FLAT_BODY.name} {limits[0].why}"
     body, reflections = scene.body, _reflections(scene)
+    if takes(FROM_REST, scene) and (thin := thin_plate_part(scene).error) > ERROR.error:
+        return f"shear and rotary inertia change the motion of this sheet by {change_text(thin)}"
     if body.sides == "absorbing":
         return "absorbing sides of a sheet reflect in part"
     reflected = f" about {percent(reflections)}" if reflections < 1 else ""
@@ -236,69 +255,52 @@ def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
     )
 
 
-def _plan_known_error(request: _Request) -> tuple[Plan, list[ErrorPart]]:
-    """Plan a model that states its own error, and return the parts of its error.
+def _plan_without_mesh(request: _Request) -> tuple[Plan, list[ErrorPart]]:
+    """Plan a model whose mesh is not refined, and return the parts of its error.
 
     The error of a sheet at large deflection does not follow from the linear response, because
     stretching stiffens the sheet and makes its waves longer.
     """
     scene, model, options = request.scene, request.model, request.options
-    is_auto_modes = model is FROM_REST and options.model == "auto"
-    highest, line_row = _highest_line(scene, request.tolerance) if is_auto_modes else (0.0, None)
-    start = request.start_error()
-    rows, size = [request.model_row(start, model.method)], None
-    source = f"the {model.method}"
-    cure = "use a larger tolerance" if model.needs_body else "use a model with waves"
+    start, size, highest = request.start_error(), None, 0.0
+    rows = [request.model_row(start, "" if model.is_infinite else model.method)]
     if model.default_size:
         size = options.h or model.default_size(scene.body)
         check_mesh(scene.body, size)
         reason = REQUESTED if options.h else f"the default of {model.name}"
         rows.append(PlanRow(what="element size", value=f"{1e3 * size:.2f} mm", reason=reason))
-        source, cure = f"elements of {1e3 * size:.3g} mm", "use smaller elements"
-    if model.default_size or is_auto_modes:
+    if model.needs_body:
+        highest, line_row = _highest_line(scene, request.tolerance)
         neglected = neglected_rows(scene, highest)
-        rows += [r for r in neglected if not (model.is_nonlinear and "stretching" in r.what)]
-    own = model.error(scene, size) if model.error else np.nan
-    parts = [ErrorPart(source=source, error=own, cure=cure), errors.start_part(model, start)]
+        rows = [
+            line_row,
+            *rows,
+            *(row for row in neglected if not (model.is_nonlinear and "stretching" in row.what)),
+        ]
+    parts = [*errors.own_parts(model, scene, size), errors.start_part(model, start)]
+    parts += _parts_of_infinite_body(request) if model.is_infinite else []
     planned = Plan(
-        model=model.name, body=scene.body, h=size, highest=highest, error=errors.total_error(parts),
-        rows=(*([line_row] if line_row else []), *rows), seconds=model.seconds,
-        memory=model.memory,
-        warnings=() if np.isfinite(own) else (NO_ERROR.format(model.name),),
+        model=model.name, body=scene.body, h=size, highest=highest, rows=tuple(rows),
+        seconds=model.seconds, memory=model.memory,
     )  # fmt: skip
     return planned, parts
 
 
-def _plan_wavenumber_integral(request: _Request) -> tuple[Plan, list[ErrorPart]]:
-    """Plan a wavenumber integral, which leaves out reflections from the sides, and return the parts
-    of its error.
-    """
-    scene, model, tolerance = request.scene, request.model, request.tolerance
-    highest, line_row = _highest_line(scene, tolerance)
-    start, reflections = request.start_error(), _reflections(scene)
-    others = takers(scene) if 4 * reflections > tolerance else []  # may be the cure of the total
-    parts = [
+def _parts_of_infinite_body(request: _Request) -> list[ErrorPart]:
+    """Return the parts due to reflections from the sides, and to motion above the band."""
+    scene, model = request.scene, request.model
+    reflections = _reflections(scene)
+    others = takers(scene) if 4 * reflections > request.tolerance else []  # may cure the total
+    return [
         ErrorPart(
-            source=f"reflections from the sides, which {model.name} leaves out",
+            name="sides", source=f"reflections from the sides, which {model.name} leaves out",
             error=reflections,
             cure=f"use --model {others[0]}" if others else "use absorbing sides",
         ),
-        errors.start_part(model, start),
         errors.band_part(
             scene, TRANSFORM_RATE / 4, left_out.above_band_error(scene, model, request.grid)
         ),
-        ErrorPart(
-            source="the wavenumber integral",
-            error=INTEGRAL_ERROR,
-            cure=f"use a tolerance of {100 * INTEGRAL_ERROR:g} % or more",
-        ),
-    ]
-    planned = Plan(
-        model=model.name, body=scene.body, highest=highest, seconds=model.seconds,
-        memory=model.memory, error=errors.total_error(parts, independent=True),
-        rows=(line_row, request.model_row(start), *neglected_rows(scene, highest)),
-    )  # fmt: skip
-    return _with_series(planned, request, parts)
+    ]  # fmt: skip
 
 
 def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
@@ -330,15 +332,14 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
         parts.append(_step_part(scene, options.dt))
     planned = Plan(
         model=model.name, body=body, symmetry=axes, h=mesh.h, highest=highest,
-        error=errors.total_error(parts), seconds=sum(effort.seconds.values()),
-        memory=effort.peak_memory, prepared=mesh.prepared,
+        seconds=sum(effort.seconds.values()), memory=effort.peak_memory, prepared=mesh.prepared,
         rows=(
             line_row, request.model_row(start), *rows,
             *element_rows(scene, tolerance, axes, mesh, highest, options.h),
         ),
-        warnings=errors.element_warnings(scene, mesh.h, mesh.error),
+        cautions=errors.element_warnings(scene, mesh.h),
     )  # fmt: skip
-    return _with_series(planned, replace(request, scene=scene), parts)
+    return planned, parts
 
 
 def _step_part(scene: Scene, dt: float | None) -> ErrorPart:
@@ -348,25 +349,4 @@ def _step_part(scene: Scene, dt: float | None) -> ErrorPart:
     # Frequencies are lower by (w dt)^2 / 12 (Hughes 1987, chapter 9).
     error = min(1.0, value * (2 * np.pi * frequency * step) ** 2 / 12)
     source = f"a time step of {1e3 * step:.3g} ms"
-    return ErrorPart(source=source, error=error, cure="use a smaller time step")
-
-
-def _with_series(
-    planned: Plan, request: _Request, parts: list[ErrorPart]
-) -> tuple[Plan, list[ErrorPart]]:
-    """Add the error of Prony series to a plan, if its model uses them for modulus laws."""
-    scene, tolerance = request.scene, request.tolerance
-    part = errors.series_part(scene, planned.model, tolerance, planned.prepared)
-    if part is None:
-        return planned, parts
-    rows = tuple(
-        PlanRow(
-            what="modulus law",
-            value=solid.series(series_tolerance(tolerance)).words,
-            reason=f"replaces the law in {planned.model}, which changes the motion of the probes "
-            f"by {change_text(part.error)}",
-        )
-        for solid in own_laws(scene.body)
-    )
-    planned = replace(planned, error=planned.error + part.error, rows=(*planned.rows, *rows))
-    return planned, [*parts, part]
+    return ErrorPart(name="steps", source=source, error=error, cure="use a smaller time step")

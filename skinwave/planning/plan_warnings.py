@@ -1,70 +1,56 @@
 """Warnings of a response that differs from the request, apart from its expected error."""
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import numpy as np
 
-from simple_model import Response
+from simple_model import Response, Statement
 from simple_model.load.line_names import line_names
 from simple_model.load.sampling import step
 from simple_model.numbers import EN_DASH, significant
 from skinwave.models import named
 from skinwave.models.limits import cures_for, in_words
-from skinwave.models.relative_change import change_text
 from skinwave.planning.estimates import mean_gain
-from skinwave.planning.left_out import LINEAR, deflection_ratio, stretching_error
+from skinwave.planning.left_out import LINEAR, deflection_ratio
 from skinwave.scene.scene import Scene
 
 NONLINEAR = "plate-modes-nonlinear", "fem-nonlinear"  # the cheaper first
-ERROR_UNKNOWN = (
-    "the discretisation error is unknown because the file has only one mesh; provide a finer mesh "
-    "and compare the results"
-)
-NO_ERROR = "{} does not estimate its error; compare its response with that of another model"
 DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
 WEAK_LINE_RATIO = 0.05  # of the strongest line of a load: no warning if weaker ones are left out
 
 
-def response_warnings(
-    scene: Scene, response: Response, predicted: float, tolerance: float
-) -> tuple[str, ...]:
-    """Return warnings of a response beyond those of its plan, with its `predicted` error."""
+def stated(
+    scene: Scene, response: Response, statement: Statement, cautions: Iterable[str] = ()
+) -> Response:
+    """Return a response with the statement of its error, and with its warnings and `cautions`."""
+    warnings = (*statement.warnings, *cautions, *response_warnings(scene, response))
+    effort = replace(response.effort, errors=statement, warnings=warnings)
+    return replace(response, load=scene.pressure, effort=effort)
+
+
+def response_warnings(scene: Scene, response: Response) -> tuple[str, ...]:
+    """Return warnings of a response beyond those of its plan."""
     return (
-        *larger_error(scene, response, predicted, tolerance),
-        *stretching(scene, response, tolerance),
+        *large_deflection(scene, response),
         *lines_left_out(scene, response),
         *implausible(scene),
     )
 
 
-def larger_error(
-    scene: Scene, response: Response, predicted: float, tolerance: float
-) -> tuple[str, ...]:
-    """Warn of an error measured by the model above both tolerance and prediction."""
-    error = response.expected_error
-    if not error > np.fmax(predicted, tolerance):
-        return ()
-    return (
-        f"{response.model}, {scene.reading.record.words}: expected error {change_text(error)}, "
-        f"tolerance {100 * tolerance:g} %, by comparison with the linear motion of a thin plate; "
-        "read the displacement, or use smaller elements and shorter time steps",
-    )
-
-
-def stretching(scene: Scene, response: Response, tolerance: float) -> tuple[str, ...]:
-    """Warn of a linear model of a sheet that deflects or stretches too much."""
-    model = named(response.model)
-    if model.is_nonlinear or not response.record.of_body:
+def large_deflection(scene: Scene, response: Response) -> tuple[str, ...]:
+    """Warn of a linear model of a sheet that deflects too much for it."""
+    if named(response.model).is_nonlinear or not response.record.of_body:
         return ()
     ratio = deflection_ratio(scene, response)
-    error = stretching_error(scene, model, tolerance)
-    if ratio <= LINEAR and error <= tolerance:
+    if ratio <= LINEAR:
         return ()
     each = [cures_for(scene, named(name)) for name in NONLINEAR] if scene.body.is_held else []
     cures = next(filter(None, each), [])
     cure = in_words(cures, "") if cures else "use a thicker sheet or a lower pressure"
-    effect = f" and changes the motion by about {change_text(error)}" if error else ""
     return (
         f"the sheet deflects by {significant(ratio, 2)} times its thickness, and its stretching is "
-        f"left out{effect}; {cure}",
+        f"left out; {cure}",
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from simple_model import Statement
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import ReducedBody
 from skinwave.scene.scene import Body
@@ -31,10 +32,10 @@ class Plan:
     symmetry : str, axes out of "xy" across which the body is halved
     h : float or None, element size in m; None without a mesh
     highest : float, highest relevant line of the load in Hz
-    error : float, expected relative error
+    statement : Statement, the parts of the expected error
     seconds, memory : float, predicted cost of the first response in s and bytes
     rows : tuple of PlanRow, the decisions with their reasons
-    warnings : tuple of str, a sentence for each part of the request that is not met
+    cautions : tuple of str, warnings apart from those of the expected error
     prepared : ReducedBody or None, the body reduced on the planned mesh
     options : SolveOptions, the request
 
@@ -53,18 +54,30 @@ class Plan:
     symmetry: str = ""
     h: float | None = None
     highest: float = 0.0
-    error: float = 0.0
+    statement: Statement = field(default_factory=Statement)
     seconds: float = 0.1
     memory: float = 1e8
     rows: tuple[PlanRow, ...] = ()
-    warnings: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
     prepared: ReducedBody | None = field(default=None, repr=False)
     options: SolveOptions = field(default=DEFAULT, repr=False)
+
+    @property
+    def error(self) -> float:
+        """Expected relative error; inf if unknown."""
+        return self.statement.error
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each part of the request that is not met."""
+        return (*self.statement.warnings, *self.cautions)
 
     def table(self) -> dict[str, Any]:
         """Return the plan as values for JSON, without the reduced body and the options."""
         values = asdict(replace(self, prepared=None, options=DEFAULT))
-        return {key: value for key, value in values.items() if key not in ("prepared", "options")}
+        for name in ("prepared", "options", "statement", "cautions"):
+            del values[name]
+        return values | self.statement.summary() | {"warnings": self.warnings}
 
     def __repr__(self) -> str:
         return call_report("notebook", "plan_line", self)

@@ -27,6 +27,7 @@ from skinwave.typing import Array, Floats
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
 FIRST_HAND = 1.6  # of the default element size, for hands
 FINEST = 0.4  # of the default element size: the finest that is tried
+STILL = 1e-6  # of the waveforms: weaker motion about their mean is round-off
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +102,7 @@ def refine(
         prepared, values = solve(size)
         same = coarse.effort.dofs == prepared.effort.dofs
         error = mesh_error(body, (before, size), (other, values), same=same)
-        if h or not error > tolerance or size == sizes[-1]:
+        if h or not tolerance < error < np.inf or size == sizes[-1]:
             return Refined(h=size, error=error, compared=before, prepared=prepared)
         before, coarse, other = size, prepared, values
         size = CONTROLLER.nearest(finer_sizes(sizes, size), size, error, tolerance)
@@ -174,8 +175,14 @@ def refinement_ratio(body: Body, other: float, h: float) -> float:
 
 
 def about_its_rest(scene: Scene, waveforms: Array) -> Array:
-    """Return waveforms (t, p), without their mean under gravity, which would hide errors."""
-    return waveforms - waveforms.mean(axis=0) if scene.load.gravity else waveforms
+    """Return waveforms (t, p), under gravity without their mean, which would hide errors, unless
+    nothing else moves the body.
+    """
+    if not scene.load.gravity:
+        return waveforms
+    moving = waveforms - waveforms.mean(axis=0)
+    is_still = np.linalg.norm(moving) <= STILL * np.linalg.norm(waveforms)
+    return waveforms if is_still else moving
 
 
 def quantity_of_interest(prepared: ReducedBody, scene: Scene, response: Response) -> Array:
@@ -206,10 +213,10 @@ def mesh_error(
     body: Body, sizes: tuple[float, float], quantities: tuple[Array, Array], *, same: bool
 ) -> float:
     """Return the error at the second of two element sizes in m, from their quantities of interest
-    (k, p). If both give the `same` mesh, it is 1, or nan for a mesh from a file.
+    (k, p). If both give the `same` mesh, it is 1, or inf, unknown, for a mesh from a file.
     """
     if same:
-        return np.nan if body.file else 1.0
+        return np.inf if body.file else 1.0
     return CONTROLLER.error(*quantities, refinement_ratio(body, *sizes))
 
 

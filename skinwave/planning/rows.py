@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from simple_model.numbers import EN_DASH, percent, significant
+from simple_model.numbers import EN_DASH, change_text, percent, significant
 from skinwave.bodies.sheet import air_mass
 from skinwave.bodies.sizes import AT, coat, layer_name, thicknesses
 from skinwave.models.meshed import axes_of_probes, mirrored_axes
 from skinwave.models.reduced import BAND, reduction_tolerance
-from skinwave.models.relative_change import change_text
 from skinwave.planning.left_out import mean_sag
 from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import Refined
@@ -69,7 +68,7 @@ def _size_row(mesh: Refined, tolerance: float, h: float | None) -> PlanRow:
         why = "the finest size that is tried"
     reason = (
         "the only mesh of the file, so its error is unknown"
-        if np.isnan(mesh.error)
+        if np.isinf(mesh.error)
         else f"{why}; mesh error {change_text(mesh.error)}, by comparison with elements of "
         f"{1e3 * mesh.compared:.2f} mm"
     )

@@ -9,8 +9,6 @@ import warnings
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from simple_model import Response
 from skinwave.models import named
 from skinwave.models.laws import check_laws
@@ -18,7 +16,7 @@ from skinwave.models.limits import check_takes
 from skinwave.models.options import SolveOptions, from_first, sample_grid
 from skinwave.models.reduced import answer
 from skinwave.planning.plan import plan
-from skinwave.planning.plan_warnings import response_warnings
+from skinwave.planning.plan_warnings import stated
 from skinwave.planning.record import Plan
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning, versions
@@ -63,8 +61,8 @@ def simulate(
     >>> import skinwave
     >>> scene = skinwave.loads("[tacton]\\nduration_s = 0.02\\n[body]\\nthickness_mm = inf")
     >>> response = skinwave.simulate(scene)
-    >>> response.model, response.expected_error
-    ('flat-body', 0.002)
+    >>> response.model, response.effort.errors.words
+    ('flat-body', 'integral 0.20 %; together below 0.50 %')
     """
     with progress_callback(progress) as report:
         request = SolveOptions(model=model, tolerance=tolerance, progress=report, **options)
@@ -106,11 +104,6 @@ def _solve_by_model(scene: Scene, options: SolveOptions) -> Response:
 
 
 def _check(scene: Scene, planned: Plan, response: Response) -> Response:
-    """Return the response with all warnings, and the larger of planned and measured errors."""
-    tolerance = planned.options.tolerance
-    others = response_warnings(scene, response, planned.error, tolerance)
-    return replace(
-        response, load=scene.pressure,
-        effort=replace(response.effort, warnings=(*planned.warnings, *others)),
-        expected_error=float(np.fmax(planned.error, response.expected_error)),
-    )  # fmt: skip
+    """Return the response with planned errors, or those measured instead, and all warnings."""
+    statement = planned.statement.with_parts(response.effort.errors.parts)
+    return stated(scene, response, statement, planned.cautions)

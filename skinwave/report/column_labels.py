@@ -14,7 +14,7 @@ NAMES = {
     "body.thickness_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
     "spread_20db_mm": "spread to -20 dB", "kernel_misfit": "misfit to the point kernel",
     "kernel_delay_ms": "delay behind the point kernel",
-    "expected_error": "expected error of the mesh", "above_threshold_cm2": "area above threshold",
+    "expected_error": "expected error", "above_threshold_cm2": "area above threshold",
 }  # fmt: skip
 
 

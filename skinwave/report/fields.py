@@ -13,7 +13,7 @@ from meshes import TetMesh
 from meshes.tetmesh import facet_set
 from simple_model import Effort
 from simple_model.drawing import new_axes
-from simple_model.numbers import plural, significant, stated_error
+from simple_model.numbers import plural, significant
 from simple_model.quantities import DISPLACEMENT
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import from_rest, oscillating
@@ -46,7 +46,6 @@ class Field:
     times : (t,) float, s
     displacement : (t, n, 3) float, m, of the nodes of `mesh`
     effort : Effort
-    expected_error : float, relative error of the waveforms at the probes; nan if unknown
 
     Examples
     --------
@@ -64,7 +63,11 @@ class Field:
     times: Floats
     displacement: Floats
     effort: Effort
-    expected_error: float = np.nan
+
+    @property
+    def expected_error(self) -> float:
+        """Expected relative error of the waveforms at the probes; inf if unknown."""
+        return self.effort.errors.error
 
     def __repr__(self) -> str:
         size = 1e6 * float(np.sqrt((self.displacement**2).sum(axis=2).max(initial=0.0)))
@@ -72,7 +75,7 @@ class Field:
             f"{plural(len(self.times), 'time')} from {1e3 * self.times[0]:g} to "
             f"{1e3 * self.times[-1]:.5g} ms, displacement at most {significant(size)} µm",
             f"{self.mesh!r}"[1:-1],
-            f"expected error {stated_error(self.expected_error)}",
+            f"expected error {self.effort.errors.words}",
             plural(len(self.effort.warnings), "warning"),
         ]
         return f"<Field: {'; '.join(parts)}>"
@@ -217,7 +220,4 @@ def field(
     response = assess(surface, response, compared, replace(options, progress=silent))
     for sentence in response.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
-    return Field(
-        mesh=moved.mesh, times=times, displacement=displacement, effort=response.effort,
-        expected_error=response.expected_error,
-    )  # fmt: skip
+    return Field(mesh=moved.mesh, times=times, displacement=displacement, effort=response.effort)

@@ -7,7 +7,7 @@ import numpy as np
 
 from simple_model import drawing
 from simple_model.load.focus import spot_width
-from simple_model.numbers import interval, percent, plural, stated_error
+from simple_model.numbers import interval, percent, plural
 from skinwave.report.description import scene_rows
 from skinwave.typing import Floats
 
@@ -53,8 +53,8 @@ def plan_line(plan: "Plan") -> str:
     body = plan.body.of_kind.words(plan.body)
     body += f" halved across {' and '.join(plan.symmetry)}" if plan.symmetry else ""
     size = f"elements of {1e3 * plan.h:.3g} mm" if plan.h else "no mesh"
-    error, warnings = stated_error(plan.error), plural(len(plan.warnings), "warning")
-    parts = [f"{size}, {body}", f"expected error {error}", _cost(plan), warnings]
+    warnings = plural(len(plan.warnings), "warning")
+    parts = [f"{size}, {body}", f"expected error {plan.statement.words}", _cost(plan), warnings]
     return _line(f"Plan of {plan.model}", parts)
 
 
@@ -104,7 +104,7 @@ def plan_page(plan: "Plan") -> str:
 
     kind = plan.body.of_kind
     image = drawing.picture(draw, 3.2, 3.0) if kind.discretise and kind.is_bounded else b""
-    facts = [["expected error", stated_error(plan.error)], ["cost", _cost(plan)]]
+    facts = [["expected error", plan.statement.words], ["cost", _cost(plan)]]
     rows = [[row.what, row.value, row.reason] for row in plan.rows]
     tables = [drawing.table(facts), drawing.table(rows, ["", "", "reason"])]
     return drawing.page(f"Plan: {plan.model}", image, tables, plan.warnings)

@@ -66,8 +66,9 @@ def fill(folder: Path, run: Run) -> None:
     name = run.response.quantity if run.response.record.of_body else DISPLACEMENT.name
     write_responses(folder / record.RESPONSES, {name: run, run.model: run})
     write_lines(folder / "lines.csv", [run])
-    effort = json.dumps(asdict(run.response.effort), indent=1)
-    (folder / "effort.json").write_text(effort, encoding="utf-8")
+    effort = asdict(run.response.effort)
+    del effort["errors"]  # in record.json
+    (folder / "effort.json").write_text(json.dumps(effort, indent=1), encoding="utf-8")
     (folder / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
     options = {"tacton": run.tacton, "body": run.body, "model": run.model}
     command = {"typed": "", "name": "simulate", "options": options}

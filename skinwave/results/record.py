@@ -4,7 +4,6 @@ import json
 import shlex
 from argparse import Namespace
 from collections.abc import Mapping
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -47,11 +46,11 @@ def write(
         "versions": versions(), "threads": threads(),
     }  # fmt: skip
     if response:
-        effort, error = response.effort, response.expected_error
+        effort = response.effort
         content |= {
             "model": response.model, "solver": effort.solver, "mesh": effort.mesh or None,
             "h_m": effort.h or None, "dt_s": effort.dt or None,
-            "expected_error": error if isfinite(error) else None,
+            **effort.errors.summary(),
         }  # fmt: skip
     (folder / FILE).write_text(json.dumps(content, indent=1), encoding="utf-8")
 

@@ -15,7 +15,7 @@ import numpy as np
 import fem
 from fem.load_and_probe import on_surface, surface_frame
 from meshes import reading
-from simple_model import MovingPressure, sensation_level
+from simple_model import MovingPressure, Statement, sensation_level
 from simple_model.layers.flat_body import field_lines, steady_lines
 from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
@@ -26,11 +26,11 @@ from skinwave.models.flat_body import field_read
 from skinwave.models.limits import takes
 from skinwave.models.meshed import line_factor, probe_rows
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST, steady_motion
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import read_at
-from skinwave.planning.left_out import beyond_linear
+from skinwave.planning.errors import own_parts
+from skinwave.planning.left_out import stretches
 from skinwave.results.motion import REDUCTION_TOLERANCE, BodyMotion, reduced_motion
 from skinwave.scene.scene import Reading, Scene
 from skinwave.typing import Floats
@@ -145,7 +145,7 @@ def _plate_map(scene: Scene, x: Floats, y: Floats, model: str = "auto") -> Surfa
     """Return the map of a thin plate from its modes, linear if the model is or if that suffices."""
     places = _places(x, y)
     is_linear = model != "auto" and not named(model).is_nonlinear
-    if is_linear or not beyond_linear(scene, MAP_TOLERANCE):
+    if is_linear or not stretches(scene, MAP_TOLERANCE):
         return _field(scene, x, y, plate_lines(scene, places), "thin plate")
     _, z, modes = steady_motion(scene, MAP_TOLERANCE)
     shapes, covariance = modes.at(places - scene.body.placement.offset), np.cov(z, rowvar=False)
@@ -183,7 +183,8 @@ def quantity_map(
         lines = field_lines(body, scene.pressure, places, threshold=NEGLIGIBLE_LINE_RATIO)
         return _field(scene, x, y, lines, "wavenumber integral of the laterally infinite body")
     if options.h is None and scene.reading.is_plain and takes(FROM_REST, scene):
-        return replace(_plate_map(scene, x, y), error=PLATE_ERROR)
+        error = Statement(parts=own_parts(FROM_REST, scene, None)).error
+        return replace(_plate_map(scene, x, y), error=error)
     if scene.load.support_motion or (scene.load.gravity and scene.reading.record.invariant):
         raise ValueError(
             "a map shows motion about the rest without gravity, on a support at rest. Remove "

@@ -271,7 +271,7 @@ def _read_run(path: Path) -> Run:
     scene = read(path.parent / "scene.toml")
     arrays = reading.load_arrays(path)
     effort = _read_json(path.parent / "effort.json", EFFORT) or {}
-    expected = (_read_json(path.parent / record.FILE, {}) or {}).get("expected_error")
+    errors = (_read_json(path.parent / record.FILE, {}) or {}).get("errors", [])
     try:
         if any(array.dtype.kind not in "fiu" for array in arrays.values()):
             raise ValueError("it has arrays that are not numbers")
@@ -279,8 +279,7 @@ def _read_run(path: Path) -> Run:
         response = Response(
             model=model, times=arrays["t"], probes=arrays["probes"], values=arrays[model],
             quantity=named(model).quantity or scene.quantity,
-            effort=effort_of(effort, "effort.json"),
-            expected_error=np.nan if expected is None else fitting(expected, float, "the error"),
+            effort=effort_of(effort, errors, "effort.json"),
         )  # fmt: skip
         if len(response.times) < 2 or not len(response.probes) or response.probes.shape[1] != 2:
             raise ValueError("it has fewer than two samples, or no probe in a plane")

@@ -146,7 +146,7 @@ def page_of(
     if any(len(group) > 1 for group in groups.values()):
         body.append(Details("How far the models agree", [tables.agreement_table(groups)]))
     effort = tables.effort_table(_efforts_by_body(runs), len(groups), seconds)
-    body.append(Details("Effort", effort))
+    body.append(Details("Errors and effort", effort))
     again: list[Part] = [preformat(command)] if command else []
     scene = [preformat(dumps(runs[-1].scene))] if is_single else []
     body.append(Details("The scene and the command", [*again, *notes, *scene]))
@@ -188,6 +188,7 @@ def _efforts_by_body(runs: Sequence[Run]) -> dict[str, Effort]:
     return {
         body: replace(
             of_body[0], energy_imbalance=max(e.energy_imbalance for e in of_body),
+            errors=max((e.errors for e in of_body), key=lambda errors: errors.error),
             radiated=max(e.radiated for e in of_body),
         )
         for body, of_body in efforts.items()

@@ -31,6 +31,8 @@ AGREEMENT = (
     "misfit at the best gain and delay", "delay at the probes, ms",
     "phase delay of the strongest component, ms", "spread over the probes at -6 / -20 dB, mm",
 )  # fmt: skip
+ERRORS = "body", "expected error of the waveform at the worst probe", "to lower the largest part"
+ERROR_RULE = "The squares of the parts add, because their causes are independent."
 EFFORT = (
     "body", "degrees of freedom", "reduced to", Column("estimated reduction error", digits=2),
     Column("relative energy imbalance", digits=1), "radiated share of loss", "solver",
@@ -196,7 +198,13 @@ def _range(values: Floats) -> str:
 def effort_table(
     efforts: Mapping[str, Effort], tactons: int, total: float | None = None
 ) -> list[Part]:
-    """Return a table of time, size and memory of each body, and the totals."""
+    """Return the parts of the expected error of each body, a table of time, size and memory, and
+    the totals.
+    """
+    errors = [
+        [label(name), effort.errors.words, effort.errors.cure]
+        for name, effort in efforts.items() if effort.errors.parts
+    ]  # fmt: skip
     rows = [
         [label(name), effort.dofs, effort.reduced_dofs or None, effort.estimate or None,
          effort.energy_imbalance or None,
@@ -211,4 +219,5 @@ def effort_table(
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
     text = f"{plural(tactons, 'Tacton')}: {significant(spent, 2)} s"
     text += f", at most {peak:.2f} GiB in one process" * bool(peak)
-    return [Table(EFFORT, rows), f"{text}. {named}"]
+    parts: list[Part] = [Table(ERRORS, errors), ERROR_RULE] if errors else []
+    return [*parts, Table(EFFORT, rows), f"{text}. {named}"]

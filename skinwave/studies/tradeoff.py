@@ -24,7 +24,7 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.models.plate_modes import MODES as PLATES
 from skinwave.models.reduced import answer, prepare
-from skinwave.planning.left_out import beyond_linear
+from skinwave.planning.left_out import stretches
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import legend, png
 from skinwave.results.comparison import compare
@@ -135,7 +135,7 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
         raise ValueError("a scene without a body has one model only. Give it a sheet or a slab")
     tested = list(chosen or candidates(scene))
     fine = [Candidate(model="fem", h=round(default_size(scene.body) * f, 6)) for f in FINEST]
-    if beyond_linear(scene, min(BARS)):
+    if stretches(scene, min(BARS)):
         fine = [Candidate(model=STRETCHED.name, tolerance=t) for t in FINEST_TOLERANCES]
     runs = {}
     with pool(1, threads=None, renewed=True) as other:

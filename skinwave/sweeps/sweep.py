@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -178,8 +177,7 @@ def _row(
             response, mesh = on_mesh(point.scene, options, mesh)
             row["h_mm"] = 1e3 * mesh.h
             row["reduced_together"] = mesh.family.members if mesh.family else 1
-        if isfinite(response.expected_error):
-            row["expected_error"] = response.expected_error
+        row |= response.effort.errors.columns()
         row |= result_columns(point.scene, response)
     except Exception as error:  # of any kind: the other runs continue
         row["error"] = error_text(error)

@@ -4,16 +4,18 @@ from dataclasses import fields
 from math import isfinite
 from typing import Any
 
-from simple_model import Effort
+from simple_model import Effort, Statement
 
 PLAN = {
     "rows": [{"what": str, "value": str, "reason": str}], "tolerance": float, "warnings": [str],
     "model": str, "misfit?": float,
 }  # fmt: skip
+ERRORS = [{"name": str, "source": str, "error": float | None, "cure": str}]
 _TABLES = {"seconds": {str: float}, "versions": {str: str}, "warnings": [str]}
 EFFORT = {
     f"{one.name}?": _TABLES.get(one.name, str if isinstance(one.default, str) else float)
     for one in fields(Effort)
+    if one.name != "errors"
 }
 
 
@@ -36,14 +38,17 @@ def is_finite_number(value: Any) -> bool:
         return False
 
 
-def effort_of(table: Any, where: str) -> Effort:
-    """Return the effort in a table of a JSON file; raise a ValueError for other contents."""
+def effort_of(table: Any, errors: Any, where: str) -> Effort:
+    """Return the effort in a table of a JSON file, with the `errors` of its record; raise a
+    ValueError for other contents.
+    """
     fitting(table, EFFORT, where)
-    if unknown := table.keys() - {one.name for one in fields(Effort)}:
+    statement = Statement.of_errors(fitting(errors, ERRORS, where))
+    if unknown := table.keys() - {key.removesuffix("?") for key in EFFORT}:
         raise ValueError(
             f"{where} has the unknown key {min(unknown)[:40]!r}; compute the result again"
         )
-    return Effort(**table)
+    return Effort(**table, errors=statement)
 
 
 def _fits(value: Any, pattern: Any) -> bool:
@@ -51,6 +56,8 @@ def _fits(value: Any, pattern: Any) -> bool:
         return isinstance(value, list) and all(_fits(item, pattern[0]) for item in value)
     if pattern is float:
         return is_finite_number(value)
+    if pattern == float | None:
+        return value is None or is_finite_number(value)
     if not isinstance(pattern, dict):
         return isinstance(value, pattern)
     if not isinstance(value, dict):

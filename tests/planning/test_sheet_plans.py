@@ -14,7 +14,7 @@ from skinwave.models.limits import cures_for
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.planning.plan import chosen_model, why_modes
-from skinwave.planning.plan_warnings import NONLINEAR, stretching
+from skinwave.planning.plan_warnings import NONLINEAR, large_deflection
 from skinwave.planning.simulate import compute, solve
 from skinwave.results.comparison import compare
 from skinwave.scene.file import loads
@@ -106,7 +106,7 @@ def test_the_cure_of_a_stretching_warning_can_be_computed(mounting):
     )
     scene = loads(text + "\n[probes]\npoints_mm = [[0, 0]]")
     response = compute(scene, FROM_REST.name)
-    (said,) = stretching(scene, response, 0.05)
+    (said,) = large_deflection(scene, response)
     (cure,) = cures_for(scene, named(NONLINEAR[0]))
     assert cure.words in said
     assert np.isfinite(compute(cure.scene, cure.model).values).all()

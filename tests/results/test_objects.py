@@ -12,7 +12,16 @@ from legible import illegible, sizes
 
 import meshes
 import skinwave
-from simple_model import Effort, MovingPressure, Response, Tacton, Trajectory, phasors
+from simple_model import (
+    Effort,
+    ErrorPart,
+    MovingPressure,
+    Response,
+    Statement,
+    Tacton,
+    Trajectory,
+    phasors,
+)
 from simple_model.load.focus import spot_width
 from skinwave.planning.record import PlanRow
 from skinwave.planning.simulate import compute
@@ -25,6 +34,7 @@ from skinwave.sweeps.in_python import SweepTable
 pytestmark = pytest.mark.filterwarnings("ignore::skinwave.SkinwaveWarning")
 ROOT = Path(__file__).parents[2]
 RATE = 10_000.0
+MESH = ErrorPart(name="mesh", source="elements of 3 mm", error=0.03, cure="use smaller elements")
 PLACES = np.array([[0.0, 0.0], [0.1 / 3, -0.02]])
 
 
@@ -50,7 +60,7 @@ def wave(frequency=130.0, quantity="displacement", n=1000, warnings=("too <coars
     x = 3e-6 * np.sin(2 * np.pi * frequency * times)
     return Response(
         model="made", times=times, probes=PLACES, values=np.column_stack([x, x / 2]),
-        quantity=quantity, effort=Effort(warnings=warnings), expected_error=0.03,
+        quantity=quantity, effort=Effort(warnings=warnings, errors=Statement(parts=(MESH,))),
     )  # fmt: skip
 
 

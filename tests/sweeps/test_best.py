@@ -29,7 +29,7 @@ def parabola():
         return Response(model="parabola", times=times, probes=scene.probe_points, values=values)
 
     words = {"name": "parabola", "method": "", "words": ""}
-    yield register(Model(**words, solve=solve, error=None, is_infinite=True))
+    yield register(Model(**words, solve=solve, is_infinite=True))
     del models._MODELS["parabola"]
     os.environ.pop(extensions.VARIABLE)  # which processes of other tests would read
 
