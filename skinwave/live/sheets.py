@@ -7,17 +7,19 @@ modes, minus 1. The fields of the modes are given on a square grid. The force of
 mode is the field of the mode, smoothed by the spot.
 """
 
+from math import hypot
 from typing import Any
 
 import numpy as np
 
+from simple_model import MovingPressure, Tacton
 from simple_model.layers.prony import FIT_TOLERANCE
 from simple_model.load.focus import spot_width
 from simple_model.plates.free_modes import free_vibration, relaxing_stiffness
 from simple_model.plates.modes import PlateModes
 from skinwave.models.laws import relaxing
-from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus
-from skinwave.scene.scene import Body
+from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus, thin_plate_part
+from skinwave.scene.scene import Body, Scene
 from skinwave.system.arrays import pack, quantise
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
@@ -26,6 +28,7 @@ STEP, SIDE = 3e-3, 37  # m between places of the grid of fields, and number of p
 LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last value
 LOWEST = 0.1  # m: lowest height of the focus
 ERROR = 0.01  # relative, of lines above -40 dB; it is larger for several foci on a wide path
+TYPICAL, TOLERANCE = 140.0, 0.05  # Hz and relative error, for a warning about thick sheets
 BAND = 1300.0  # Hz: modes below are kept, modes above are combined
 COUPLED_BAND = 2600.0  # Hz: coupling by loss is included for modes below
 NEGLIGIBLE = 0.005  # of the largest combination of modes above the band
@@ -56,8 +59,12 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     coupled = int(np.searchsorted(squared, (2 * np.pi * COUPLED_BAND) ** 2))
     solid = relaxing(body, FIT_TOLERANCE).solid
     free = free_vibration(*relaxing_stiffness(squared - bent, bent, solid))
+    tacton = Tacton(am_frequency=TYPICAL, duration=0.1)
+    scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=(tuple(middle),))
+    thin = thin_plate_part(scene)
     return {
-        "kind": "modal", "error": ERROR, "lowest_height_mm": 1e3 * LOWEST,
+        "kind": "modal", "error": hypot(ERROR, thin.error), "lowest_height_mm": 1e3 * LOWEST,
+        "warnings": [thin.warning(TOLERANCE)] if thin.error > TOLERANCE else [],
         "step": STEP, "side": SIDE,
         "squared": pack(squared), "diagonal": pack(bent.copy()),
         "between": quantise(bending[:coupled, :coupled]) if stretched else None,

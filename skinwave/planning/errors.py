@@ -91,9 +91,9 @@ def band_part(scene: Scene, band: float, error: float) -> ErrorPart:
     return ErrorPart(name="band", source=source, error=error, cure=cure)
 
 
-def start_part(model: Model, error: float) -> ErrorPart:
-    """Return the part due to the start from rest, which a model of the steady state leaves out."""
-    return ErrorPart(
-        name="start", source=f"the initial transient, which {model.name} leaves out", error=error,
-        cure=f"use --model {model.from_rest}",
-    )  # fmt: skip
+def start_parts(model: Model, error: float) -> Iterator[ErrorPart]:
+    """Yield the part due to the start from rest, if a model of the steady state leaves it out."""
+    if model.is_steady:
+        source = f"the initial transient, which {model.name} leaves out"
+        cure = f"use --model {model.from_rest}"
+        yield ErrorPart(name="start", source=source, error=error, cure=cure)

@@ -94,6 +94,7 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     ...     print(f"{row.what}: {row.value}")
     highest line: 200 Hz
     model: flat-body-harmonic
+    expected error: start 1.4 %, integral 0.20 %; together 1.4 %
     """
     request = _choose_model(scene, options, sample_grid(scene, options.times))
     model, tolerance = request.model, options.tolerance
@@ -277,7 +278,7 @@ def _plan_without_mesh(request: _Request) -> tuple[Plan, list[ErrorPart]]:
             *rows,
             *(row for row in neglected if not (model.is_nonlinear and "stretching" in row.what)),
         ]
-    parts = [*errors.own_parts(model, scene, size), errors.start_part(model, start)]
+    parts = [*errors.own_parts(model, scene, size), *errors.start_parts(model, start)]
     parts += _parts_of_infinite_body(request) if model.is_infinite else []
     planned = Plan(
         model=model.name, body=scene.body, h=size, highest=highest, rows=tuple(rows),
@@ -315,7 +316,7 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
             absorbing = absorbing_error(scene, body, options)
         else:
             body, rows, absorbing = extent(scene, options, highest)
-        for_mesh = replace(options, tolerance=max(tolerance - absorbing, tolerance / 2))
+        for_mesh = replace(options, tolerance=rest_of(tolerance, absorbing))
         mesh = refine(scene, body, for_mesh, symmetry=axes)
     except fem.NotReduced as error:
         limit = Limit(why=f"cannot reduce this body: {error}")
@@ -327,7 +328,7 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
         above_band=above,
     )  # fmt: skip
     start = left_out.start_error(scene, model, request.grid, mesh.prepared)
-    parts.append(errors.start_part(model, start))
+    parts += errors.start_parts(model, start)
     if model.is_stepped:
         parts.append(_step_part(scene, options.dt))
     planned = Plan(
@@ -340,6 +341,11 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
         cautions=errors.element_warnings(scene, mesh.h),
     )  # fmt: skip
     return planned, parts
+
+
+def rest_of(tolerance: float, error: float) -> float:
+    """Return what an error leaves of a tolerance for an independent one, at least half of it."""
+    return max(tolerance**2 - error**2, tolerance**2 / 4) ** 0.5
 
 
 def _step_part(scene: Scene, dt: float | None) -> ErrorPart:

@@ -19,6 +19,7 @@ from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Body, Scene
 from skinwave.sweeps.reductions import model_of
+from skinwave.system.templates import typeset
 
 PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
 SCENE = Scene(
@@ -50,6 +51,8 @@ def test_a_sweep_of_one_scene_is_its_simulation(simulated):
     peaks = 1e6 * np.abs(simulated.values).max(axis=0)
     np.testing.assert_allclose(row["peak_um"], peaks, rtol=1e-6)
     assert row["expected_error"] == pytest.approx(simulated.expected_error, rel=1e-6)
+    errors = simulated.effort.errors
+    assert (row["error_parts"], row["error_cure"]) == (errors.words, errors.cure)
 
 
 @pytest.mark.parametrize("body", ["kind = 'sheet'", "sides = 'clamped'", "kind = 'palm'", ""])
@@ -78,7 +81,7 @@ def test_a_body_with_a_free_modulus_is_that_of_its_own_value():
     np.testing.assert_allclose(found.values, own.values, atol=2e-6 * np.abs(own.values).max())
 
 
-def test_commands_write_what_python_returns(simulated, tmp_path, monkeypatch):
+def test_commands_write_what_python_returns(simulated, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(dumps(SCENE))
     size = ["--element-size", "2", "--quiet"]
@@ -88,6 +91,16 @@ def test_commands_write_what_python_returns(simulated, tmp_path, monkeypatch):
         np.testing.assert_allclose(arrays["fem"], simulated.values, atol=1e-6 * largest)
     record = json.loads(Path("run/record.json").read_text())
     assert record["expected_error"] == pytest.approx(simulated.expected_error, rel=1e-6)
+    capsys.readouterr()
+    assert main(["plan", "scene.toml", "--model", "fem", *size, "--json"]) == 0
+    statement = simulated.effort.errors
+    for written in (record, json.loads(capsys.readouterr().out)):
+        parts = {part["name"]: part["error"] for part in written["errors"]}
+        known = {part.name: part.error for part in statement.parts}
+        assert parts == pytest.approx(known, rel=1e-6)
+        assert math.hypot(*parts.values()) == pytest.approx(written["expected_error"], rel=1e-12)
+    page = Path("run/index.html").read_text()
+    assert all(words in page for words in (typeset(statement.words), typeset(statement.cure)))
 
 
 @pytest.mark.parametrize("number", NUMBERS)

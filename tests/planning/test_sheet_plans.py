@@ -7,6 +7,7 @@ import pytest
 
 import fem.krylov
 from simple_model import MovingPressure, Tacton, Trajectory, from_young
+from simple_model.layers.compliance import thick_plate
 from skinwave import plan
 from skinwave.bodies.supports import Mounting
 from skinwave.models import named
@@ -96,6 +97,88 @@ def test_the_error_of_linear_bending_is_stated(pressure):
     true = compare(compute(scene, "plate-modes-nonlinear"), linear).relative_l2.max()
     assert true < 1.1 * linear.expected_error
     assert linear.expected_error < 2 * true + 0.02
+
+
+SLOW = replace(SOLID, loss_factor=0.003)
+
+
+def test_stretching_is_stated_for_a_resonance_that_builds_up_slowly():
+    """The first 0.2 s deflect the sheet half as far as the whole record."""
+    load = MovingPressure(tacton=Tacton(am_frequency=93.7, duration=0.6), peak_pressure=0.03)
+    body = replace(STRETCHED, material=SLOW, mounting=Mounting())
+    scene = Scene(pressure=load, body=body, probes=((0.0, 0.0), (0.01, 0.005)))
+    linear = plan(scene, SolveOptions(model=FROM_REST.name))
+    largest = linear.statement.parts[0]
+    assert largest.name == "stretching"
+    assert any("stretching" in sentence for sentence in linear.warnings)
+    bent = compute(scene, "plate-modes-nonlinear", tolerance=0.1).values
+    change = np.linalg.norm(compute(scene, FROM_REST.name).values - bent, axis=0)
+    true = (change / np.linalg.norm(bent, axis=0)).max()
+    assert true > 0.3
+    assert true / 1.1 < linear.error < 1.5 * true
+    assert plan(scene).model == "plate-modes-nonlinear"
+
+
+def test_errors_of_steps_and_modes_are_those_of_the_whole_record():
+    """They grow with a record in which a resonance builds up."""
+    material = replace(SOLID, loss_factor=0.005)
+    body = replace(STRETCHED, material=material, mounting=Mounting())
+    load = MovingPressure(tacton=Tacton(am_frequency=160, duration=0.45), peak_pressure=25)
+    scene = Scene(pressure=load, body=body, probes=((0.0, 0.0), (0.01, 0.005)))
+    found = compute(scene, "plate-modes-nonlinear", tolerance=0.1)
+    options = SolveOptions(dt=found.effort.dt / 2)
+    finer = named("plate-modes-nonlinear").solve(scene, found.times, options).values
+    change = np.linalg.norm(found.values - finer, axis=0) / np.linalg.norm(finer, axis=0)
+    assert change.max() < 1.2 * found.expected_error
+
+
+THICK = """
+[tacton]
+am_frequency_hz = 88.58
+duration_s = 0.2
+[focus]
+drive = "linear"
+[body]
+kind = "sheet"
+size_x_mm = 60
+size_y_mm = 60
+thickness_mm = THICKNESS
+[body.material]
+density_kg_m3 = 1000
+young_modulus_pa = 1e6
+poisson = 0.3
+loss_factor = 0.05
+[body.mounting]
+support = "simply"
+[probes]
+points_mm = [[0, 0]]
+"""
+
+
+def test_the_theory_of_thin_plates_is_not_used_for_thick_ones():
+    """Mindlin's first frequency is 88.58 Hz where that of a thin plate is 100 Hz."""
+    scene = loads(THICK.replace("THICKNESS", "12"))
+    thin = plan(scene, SolveOptions(model=FROM_REST.name))
+    assert thin.statement.parts[0].name == "thin plate"
+    assert "--model fem" in thin.warnings[0]
+    elements = compute(scene, "fem", h=6e-3).values
+    change = np.linalg.norm(compute(scene, FROM_REST.name).values - elements)
+    true = change / np.linalg.norm(elements)
+    assert true > 0.5
+    assert true / 1.1 < thin.error < 3 * true
+    assert plan(scene, SolveOptions(tolerance=0.2)).model == "fem"
+    assert plan(loads(THICK.replace("THICKNESS", "0.5"))).model == FROM_REST.name
+
+
+def test_a_wavenumber_integral_of_a_thick_sheet_states_its_shear():
+    text = THICK.replace('support = "simply"', "").replace("THICKNESS", "3")
+    scene = loads(text.replace("[body.material]", 'sides = "absorbing"\n[body.material]'))
+    thick = scene.body.depth, scene.body.solid.poisson
+    planned = plan(scene, SolveOptions(model="flat-body"))
+    (part,) = (part for part in planned.statement.parts if part.name == "thin plate")
+    k = 1 / 4.35e-3  # 1/m, of the focal spot
+    softer, _ = thick_plate(k * thick[0], thick[1])
+    assert (1 - softer) / 4 < part.error < 4 * (1 - softer)
 
 
 @pytest.mark.parametrize("mounting", ['edges = ["left", "right"]', "tension_x_n_per_m = 5"])
