@@ -12,12 +12,13 @@ from math import isfinite
 
 import numpy as np
 
+from meshes import reading
 from simple_model import Tacton, Trajectory, even_phases
 from simple_model.choices import suggestion
 from simple_model.load.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, aliasing_notes, loudness, one_height
 from skinwave.scene.scene import Scene
-from skinwave.system.plain_text import as_utf_8, csv_table, number_in
+from skinwave.system.plain_text import csv_table, number_in
 from skinwave.typing import Floats
 
 COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
@@ -134,7 +135,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:
     """Return line numbers and fields of the lines that are neither empty nor comments."""
-    lines = as_utf_8(content).splitlines()
+    lines = reading.decode(content).splitlines()
     if len(lines) > MOST_ROWS:
         raise ValueError(f"the file has more than {MOST_ROWS:,} lines; shorten the pattern")
     kept = [(k, x) for k, x in enumerate(lines, 1) if x.strip(" ,;\t") and not x.startswith("#")]
