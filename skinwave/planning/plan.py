@@ -17,7 +17,13 @@ from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.laws import check_laws, own_laws, series_tolerance
 from skinwave.models.limits import beyond, check_takes, default_model, refusal, takers, takes
 from skinwave.models.linear_elements import FEM, TRANSIENT_RATE, step_count
-from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_times
+from skinwave.models.options import (
+    DEFAULT,
+    SolveOptions,
+    sample_grid,
+    sample_times,
+    underflow_to_zero,
+)
 from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import answer
@@ -66,6 +72,7 @@ class _Request:
         return PlanRow(what="model", value=self.model.name, reason=reason)
 
 
+@underflow_to_zero()
 def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     """Plan a scene's simulation to a relative error in its probes' waveforms.
 

@@ -14,7 +14,7 @@ import numpy as np
 import tomli_w
 
 from meshes import reading
-from simple_model.choices import choose, suggestion
+from simple_model.choices import choose
 from skinwave.scene.distributions import Spread, parse_distribution, uniform
 from skinwave.scene.file import (
     DEEPEST,
@@ -26,6 +26,7 @@ from skinwave.scene.file import (
     to_table,
     without_spreads,
 )
+from skinwave.scene.key_hints import key_hint
 from skinwave.scene.keys import SCALES, SECTIONS, with_value
 from skinwave.scene.scene import BODIES, Body, Scene, solid_of, with_body
 from skinwave.scene.spreads import PRESSURE
@@ -251,7 +252,7 @@ def _checked_key(key: str) -> str:
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
     section, _, name = key.partition(".")
     if key != BODY and (key.count(".") > DEEPEST or f"{section}.{name.split('.')[0]}" not in known):
-        hint = suggestion(key, known) or "; write a key such as tacton.size_mm"
+        hint = key_hint(key, known) or "; write a key such as tacton.size_mm"
         raise ValueError(f"'{key[:60]}' is not a key of a scene{hint}")
     return key
 

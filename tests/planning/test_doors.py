@@ -170,3 +170,18 @@ def test_a_sheet_is_linear_up_to_half_its_thickness():
     assert stretching(free, response_with(1.2e-3, free), 0.05) == ()  # all of it moves alike
     slab = loads(SLAB)
     assert stretching(slab, response_with(1.0, slab), 0.05) == ()
+
+
+@pytest.mark.parametrize(
+    ("model", "body"),
+    [
+        ("point-kernel", ""), ("flat-body", ""), ("flat-body-harmonic", "thickness_mm = inf"),
+        ("plate-modes", PLATE), ("plate-modes-transient", PLATE), ("plate-modes-nonlinear", PLATE),
+        ("fem", SMALL_BODY), ("fem-harmonic", SMALL_BODY), ("auto", ""),
+    ],
+)  # fmt: skip
+def test_callers_that_let_numpy_raise_get_the_same_response(model, body):
+    scene = loads(f"[tacton]\nam_frequency_hz = 140\nduration_s = 0.05\n[body]\n{body}")
+    with warnings.catch_warnings(), np.errstate(all="raise"):
+        warnings.simplefilter("ignore", skinwave.SkinwaveWarning)
+        assert skinwave.simulate(scene, model, 0.3).values.any()
