@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import skinwave
 from simple_model.choices import SHORTEST_PART, suggestion
 from skinwave.commands import COMMANDS
-from skinwave.commands.common import note_central_values
+from skinwave.commands.common import note_scenes
 from skinwave.system import extensions
 from skinwave.system.plain_text import printable, say
 from skinwave.system.processes import SAFE_PATH, environment
@@ -57,7 +57,7 @@ def _command(typed: list[str]) -> int:
     options.typed = typed
     no_cache = {CACHE: ""} if getattr(options, "no_cache", False) else {}
     with environment({**SAFE_PATH, **no_cache}):
-        note_central_values(options)
+        note_scenes(options)
         return int(options.command(options))
 
 

@@ -31,7 +31,7 @@ from skinwave.models.relative_change import change_text
 from skinwave.planning import errors, estimates, left_out
 from skinwave.planning.errors import ErrorPart
 from skinwave.planning.extent import absorbing_error, extent, symmetry
-from skinwave.planning.plan_warnings import NO_ERROR
+from skinwave.planning.plan_warnings import NO_ERROR, implausible
 from skinwave.planning.record import Plan, PlanRow
 from skinwave.planning.refinement import above_band, refine
 from skinwave.planning.rows import element_rows, neglected_rows
@@ -107,7 +107,10 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     request = _choose_model(scene, options, sample_grid(scene, options.times))
     if not scene.body.of_kind.discretise:
         row = request.model_row()
-        return Plan(model=request.model.name, body=scene.body, rows=(row,), options=options)
+        return Plan(
+            model=request.model.name, body=scene.body, rows=(row,), options=options,
+            warnings=implausible(scene),
+        )  # fmt: skip
     if request.model.error:
         planned, parts = _plan_known_error(request)
     elif request.model.is_infinite:
@@ -119,7 +122,7 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     error = planned.error + stretching.error
     warnings = (
         *planned.warnings, *errors.part_warnings(parts, tolerance),
-        *errors.total_warning([*parts, stretching], error, tolerance),
+        *errors.total_warning([*parts, stretching], error, tolerance), *implausible(scene),
     )  # fmt: skip
     return replace(planned, error=error, warnings=warnings, options=options)
 

@@ -1,11 +1,15 @@
 """Warnings of a response that differs from the request, apart from its expected error."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from simple_model import Response
+from simple_model.line_table import resolved_lines
 from simple_model.load.line_names import line_names
 from simple_model.load.sampling import step
 from simple_model.numbers import EN_DASH, significant
+from simple_model.response import resolution
 from skinwave.models import named
 from skinwave.models.limits import cures_for, in_words
 from skinwave.models.relative_change import change_text
@@ -20,6 +24,8 @@ ERROR_UNKNOWN = (
 )
 NO_ERROR = "{} does not estimate its error; compare its response with that of another model"
 DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
+LOSS = "loss_factor"
+WithRange = tuple[str, float, str, float, float, str]  # key, value, whose range, low, high, unit
 WEAK_LINE_RATIO = 0.05  # of the strongest line of a load: no warning if weaker ones are left out
 
 
@@ -31,6 +37,7 @@ def response_warnings(
         *larger_error(scene, response, predicted, tolerance),
         *stretching(scene, response, tolerance),
         *lines_left_out(scene, response),
+        *lines_unresolved(scene, response),
         *implausible(scene),
     )
 
@@ -83,24 +90,59 @@ def lines_left_out(scene: Scene, response: Response) -> tuple[str, ...]:
     )
 
 
+def lines_unresolved(scene: Scene, response: Response) -> tuple[str, ...]:
+    """Warn of a response too short to resolve any line of its load."""
+    resolved, lost = resolved_lines(scene.pressure, response)
+    if any(resolved.values()) or not any(lost.values()):
+        return ()
+    lowest = min(filter(None, lost.values()))
+    least = 1.1 * np.ptp(response.times) * resolution(response) / lowest  # above round-off
+    return (
+        f"the response of {1e3 * np.ptp(response.times):.3g} ms is too short to resolve any line "
+        f"of the load, so that tables of lines are empty; use duration_s = {least:.2g} or more",
+    )
+
+
 def implausible(scene: Scene) -> tuple[str, ...]:
-    """Warn of a density that no solid has, and of a probe that is given twice."""
-    warnings = []
-    lightest, heaviest = DENSITIES
-    if scene.body.of_kind.discretise:
-        warnings += [
-            f"density_kg_m3 = {density:g} is implausible; solids have "
-            f"{lightest:g}{EN_DASH}{heaviest:g} "
-            "kg/m³, so check its unit"
-            for density in sorted({solid.density for solid in scene.body.solids})
-            if not lightest <= density <= heaviest
-        ]
+    """Warn of numbers that probably have another unit, and of a probe that is given twice."""
+    warnings = [
+        f"{key} = {value:g} is implausible; {whose} {low:g}{EN_DASH}{high:g}{unit}, so check "
+        f"{'whether it is a quality factor Q: write 1 / Q' if key == LOSS else 'its unit'}"
+        for key, value, whose, low, high, unit in sorted({*_with_ranges(scene)})
+        if 0 < value < low or high < value < np.inf
+    ]
     places = [(*probe, depth) for probe, depth in zip(scene.probes, scene.depths, strict=True)]
     warnings += [
         f"points_mm contains ({1e3 * x:g}, {1e3 * y:g}) mm more than once; remove the duplicate"
         for x, y, _ in sorted({place for place in places if places.count(place) > 1})
     ]
     return tuple(warnings)
+
+
+def _with_ranges(scene: Scene) -> Iterator[WithRange]:
+    """Yield numbers of a scene whose unit may be wrong, each with the range that it usually has."""
+    body, kind, trajectory = scene.body, scene.body.of_kind, scene.tacton.trajectory
+    if scene.load.of_kind.is_of_device:
+        path = 1e3 * float(np.ptp(trajectory.outline, axis=0).max())
+        yield "size_mm" if trajectory.size else "points_mm", path, "paths have", 0.5, 1e3, " mm"
+        yield "speed_m_per_s", trajectory.speed, "paths have", 0, 340, " m/s"
+        yield "height_mm", 1e3 * scene.pressure.height, "arrays focus at", 2, 1e3, " mm"
+    farthest = 1e3 * float(np.abs(scene.probes).max())
+    yield "points_mm", farthest, "the farthest probes are at", 0.1, 1e4, " mm"
+    if not kind.discretise:
+        return
+    for solid in body.solids:
+        yield "density_kg_m3", solid.density, "solids have", *DENSITIES, " kg/m³"
+        yield "shear_modulus_pa", solid.shear_modulus, "solids have", 100, 1e12, " Pa"
+        yield LOSS, solid.loss_factor, "solids have", 0, 2, ""
+    thinnest = 1e-3 if kind.is_plate else 0.1
+    for layer in body.layers:
+        yield "thickness_mm", 1e3 * layer.thickness, "layers have", 1e-3, 1e3, " mm"
+    if not kind.is_bounded:
+        return
+    yield "thickness_mm", 1e3 * body.depth, f"bodies of kind {kind.name} have", thinnest, 1e3, " mm"
+    for key, side in (("size_x_mm", body.width), ("size_y_mm", body.height)):
+        yield key, 1e3 * side, "bodies have", 1, 1e4, " mm"
 
 
 def rigid_body_drift(scene: Scene) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import warnings
 from dataclasses import replace
 
@@ -28,6 +29,8 @@ SLAB = f'{AM}[body]\n{SMALL}sides = "clamped"\n{PROBES}'
 PAPER = f'{AM}[focus]\npeak_pressure_pa = PRESSURE\n[body]\nkind = "sheet"\nmaterial = "paper"\n'
 PAPER += "size_x_mm = 40\nsize_y_mm = 40\nthickness_mm = 0.1\n"
 PAPER += f'base = "free"\nsides = "clamped"\n{PROBES}'
+PLATE = "preset = 'paper-sheet'\nsides = 'clamped'"
+SMALL_BODY = f"{SMALL}sides = 'clamped'"
 LOUD_PAPER, QUIET_PAPER = PAPER.replace("PRESSURE", "2000"), PAPER.replace("PRESSURE", "2")
 
 # Scene, arguments, and part of one of the warnings.
@@ -150,6 +153,54 @@ def test_implausible_densities_and_repeated_probes_are_warned_of():
     assert implausible(replace(scene, depth=(0.0, 0.0, 0.001))) == ()
     warned = implausible(replace(scene, body=Body(material=light)))
     assert [sentence.partition(" ")[0] for sentence in warned] == ["density_kg_m3", "points_mm"]
+
+
+@pytest.mark.parametrize(
+    ("section", "number"),
+    [
+        ("body", "thickness_mm = 0.015"), ("body", "size_x_mm = 85000"),
+        ("focus", "height_mm = 0.2"), ("probes", "points_mm = 0.02"), ("tacton", "size_mm = 0.02"),
+        ("body.material", "density_kg_m3 = 1"), ("body.material", "shear_modulus_pa = 25"),
+        ("body.material", "loss_factor = 5"),
+    ],
+)  # fmt: skip
+def test_numbers_of_another_unit_are_warned_of(section, number):
+    solid = {"density_kg_m3": 1000, "shear_modulus_pa": 25e3, "poisson": 0.45}
+    key, _, value = number.partition(" = ")
+    table = {section: (solid if section == "body.material" else {}) | {key: float(value)}}
+    if section == "probes":
+        table = {"probes": {key: f"[[0, 0], [{value}, 0]]"}}
+    if section == "tacton":
+        table["tacton"] |= {"shape": "'circle'", "speed_m_per_s": 0.01}
+    lines = (f"[{s}]\n" + "\n".join(f"{k} = {v}" for k, v in t.items()) for s, t in table.items())
+    (sentence,) = implausible(loads("\n".join(lines)))
+    assert sentence.startswith(f"{number} is implausible")
+
+
+def test_implausible_numbers_are_warned_of_at_every_door(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = f"{AM}[body]\nkind = 'slab'\nthickness_mm = 0.015\n"
+    (tmp_path / "thin.toml").write_text(text)
+    for words in (
+        "plan thin.toml",
+        "run thin.toml",
+        "live thin.toml --no-selftest",
+        "sweep thin.toml --vary tacton.duration_s=0.05 --model flat-body-harmonic",
+    ):
+        assert main([*words.split(), "--quiet"]) == 0
+        assert capsys.readouterr().err.count("thickness_mm = 0.015 is implausible") == 1, words
+    assert any("0.015" in sentence for sentence in plan(loads(text)).warnings)
+    with pytest.warns(skinwave.SkinwaveWarning, match="0.015 is implausible"):
+        skinwave.simulate(loads(text))
+
+
+def test_a_response_too_short_for_its_lines_names_a_duration_that_works():
+    scene = "[tacton]\nam_frequency_hz = 140\nduration_s = {}\n[body]\nkind = 'none'"
+    with pytest.warns(skinwave.SkinwaveWarning, match="too short") as caught:
+        short = skinwave.simulate(loads(scene.format(0.003)))
+    assert not short.lines
+    (duration,) = re.findall(r"duration_s = ([\d.]+)", str(caught[0].message))
+    assert skinwave.simulate(loads(scene.format(duration))).lines
 
 
 def response_with(deflection, scene, model="fem"):
