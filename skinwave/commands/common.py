@@ -167,7 +167,9 @@ def note_scenes(options: argparse.Namespace) -> None:
             samples = (name == "run" and options.samples is not None) or getattr(
                 options, "best", None
             )
-            if scene.spreads and not (samples or name == "plan" or options.quiet):
+            if scene.spreads and not (
+                samples or name == "plan" or getattr(options, "quiet", False)
+            ):
                 keys = ", ".join(key for key, _ in scene.spreads)
                 say(f"skinwave: uses the central values of {keys}; skinwave run --samples N "
                     "samples their distributions", sys.stderr)  # fmt: skip

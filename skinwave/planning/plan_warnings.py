@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from simple_model import Response
-from simple_model.line_table import resolved_lines
 from simple_model.load.line_names import line_names
 from simple_model.load.sampling import step
 from simple_model.numbers import EN_DASH, significant
@@ -34,11 +33,11 @@ def response_warnings(
 ) -> tuple[str, ...]:
     """Return warnings of a response beyond those of its plan, with its `predicted` error."""
     return (
+        *implausible(scene),  # first, as at the end of those of the plan
         *larger_error(scene, response, predicted, tolerance),
         *stretching(scene, response, tolerance),
         *lines_left_out(scene, response),
         *lines_unresolved(scene, response),
-        *implausible(scene),
     )
 
 
@@ -91,15 +90,17 @@ def lines_left_out(scene: Scene, response: Response) -> tuple[str, ...]:
 
 
 def lines_unresolved(scene: Scene, response: Response) -> tuple[str, ...]:
-    """Warn of a response too short to resolve any line of its load."""
-    resolved, lost = resolved_lines(scene.pressure, response)
-    if any(resolved.values()) or not any(lost.values()):
+    """Warn of a response too short for the strongest line of its load."""
+    lines = line_names(scene.pressure, WEAK_LINE_RATIO)
+    least = resolution(response)
+    moving = np.where(lines.frequencies > 0, lines.strengths, 0.0)
+    if not moving.any() or (f := lines.frequencies[moving.argmax()]) >= least:
         return ()
-    lowest = min(filter(None, lost.values()))
-    least = 1.1 * np.ptp(response.times) * resolution(response) / lowest  # above round-off
+    length = np.ptp(response.times)
     return (
-        f"the response of {1e3 * np.ptp(response.times):.3g} ms is too short to resolve any line "
-        f"of the load, so that tables of lines are empty; use duration_s = {least:.2g} or more",
+        f"the response of {1e3 * length:.3g} ms is too short for the strongest line of the load, "
+        f"{lines.names[moving.argmax()]} at {f:.4g} Hz, so that tables of lines leave it out; use "
+        f"duration_s = {1.1 * length * least / f:.2g} or more",
     )
 
 
@@ -126,7 +127,6 @@ def _with_ranges(scene: Scene) -> Iterator[WithRange]:
         path = 1e3 * float(np.ptp(trajectory.outline, axis=0).max())
         yield "size_mm" if trajectory.size else "points_mm", path, "paths have", 0.5, 1e3, " mm"
         yield "speed_m_per_s", trajectory.speed, "paths have", 0, 340, " m/s"
-        yield "height_mm", 1e3 * scene.pressure.height, "arrays focus at", 2, 1e3, " mm"
     farthest = 1e3 * float(np.abs(scene.probes).max())
     yield "points_mm", farthest, "the farthest probes are at", 0.1, 1e4, " mm"
     if not kind.discretise:
