@@ -7,7 +7,7 @@ import re
 import stat
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -19,6 +19,13 @@ MOST_UNPACKED, MOST_GROWTH = 500_000_000, 8  # bytes of an unpacked archive, or 
 
 _BINARY = getattr(os, "O_BINARY", 0)
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")  # characters that text files do not have
+
+_SIGNATURES = {  # first bytes of files that users take for text
+    b"\x89PNG": "a PNG picture", b"\xff\xd8\xff": "a JPEG picture", b"GIF8": "a GIF picture",
+    b"%PDF": "a PDF document", b"PK": "a ZIP archive, as of Excel or NumPy", b"RIFF": "a WAV file",
+    b"\x1f\x8b": "a gzip archive", b"\x89HDF": "an HDF5 file", b"MATLAB 5": "a MATLAB file",
+    b"\x93NUMPY": "a NumPy array", b"TDSm": "a TDMS file", b"glTF": "a glTF surface",
+}  # fmt: skip
 
 PathLike = str | os.PathLike[str]
 
@@ -51,15 +58,28 @@ def read_bytes(path: PathLike, limit: int) -> bytes:
             raise ValueError(f"{path}: cannot be read ({_reason(error)}); check it") from None
 
 
-def read_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
-    """Return the UTF-8 text of a file of at most `limit` bytes, without a byte order mark."""
+def read_text(path: PathLike, limit: int = LARGEST_TEXT, must: str = "text in UTF-8") -> str:
+    """Return the UTF-8 text of a file of at most `limit` bytes; see `decode`."""
+    content = read_bytes(path, limit)
     try:
-        decoded = read_bytes(path, limit).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        decoded = "\0"
-    if "\0" in decoded:
-        raise ValueError(f"{path}: the file is not UTF-8 text; save it as UTF-8")
-    return decoded
+        return decode(content, must)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def decode(content: bytes, must: str = "text in UTF-8") -> str:
+    """Return UTF-8 text without a byte order mark; raise a ValueError for other content, which says
+    what the file is if it is binary, and what it `must` be.
+    """
+    with suppress(UnicodeDecodeError):
+        if "\0" not in (decoded := content.decode("utf-8-sig")):
+            return decoded
+    start = content[:1000].decode("latin-1").replace("\0", "")  # UTF-16 has zeros
+    is_binary = _CONTROL.search(start) is not None
+    kinds = (kind for signature, kind in _SIGNATURES.items() if content.startswith(signature))
+    if kind := next(kinds, "a binary file" if is_binary else ""):
+        raise ValueError(f"the file is {kind}, not {must}; check the path")
+    raise ValueError("the file is not UTF-8 text; save it as UTF-8")
 
 
 def read_exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:

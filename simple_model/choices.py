@@ -19,8 +19,14 @@ def choose(kind: str, value: str, known: Iterable[str]) -> str:
 
 
 def suggestion(value: object, known: Iterable[str]) -> str:
-    """Suggest the nearest known word as the end of a sentence, empty if none is near. A word
-    without its last parts, such as a key without its unit, suggests the shortest whole word.
+    """Suggest the nearest known word as the end of a sentence, empty if none is near."""
+    near = nearest(value, known)
+    return f"; did you mean '{near}'?" if near else ""
+
+
+def nearest(value: object, known: Iterable[str]) -> str:
+    """Return the known word nearest to another one, or "" if none is near. A word without its last
+    parts, such as a key without its unit, is nearest to the shortest whole word.
     """
     words, given = {word.lower(): word for word in known}, str(value)[:LONGEST_WORD].lower()
     near = sorted(
@@ -29,7 +35,7 @@ def suggestion(value: object, known: Iterable[str]) -> str:
     near = near or difflib.get_close_matches(given, words, 1, LEAST_SIMILARITY)
     if not near and len(given) >= SHORTEST_PART:
         near = [word for word in words if given in word]
-    return f"; did you mean '{words[near[0]]}'?" if near else ""
+    return words[near[0]] if near else ""
 
 
 def check_numbers(owner: str, record: object, *names: str, least: str = "above 0") -> None:

@@ -43,8 +43,8 @@ class Effort:
     bytes; element size `h` in m and time step `dt` in s, 0 if there is none; SHA-256 of the `mesh`;
     `solver`; `estimate` of the relative error of the reduction; relative `energy_imbalance`; share
     of the losses that was `radiated` through absorbing boundaries; `versions` of the software;
-    `errors`, the statement of the expected error; `warnings`, sentences on the limits of the
-    result.
+    `errors`, the statement of the expected error; `warnings`, distinct sentences on the limits of
+    the result.
     """
 
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -65,7 +65,7 @@ class Effort:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "warnings", tuple(self.warnings))  # files have lists
+        object.__setattr__(self, "warnings", tuple(dict.fromkeys(self.warnings)))  # once each
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

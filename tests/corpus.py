@@ -85,6 +85,8 @@ WHOLE_FILES = {
     "no TOML": "Dear Sir or Madam,",
     "table is a number": "tacton = 3",
     "brackets without end": "x = " + "[" * 50_000,
+    "a key of 3,000 parts": ".".join(["a"] * 3000) + " = 1",
+    "a header of 100,000 parts": f"[{'.'.join('a' * 100_000)}]",
     "digits without end": "[tacton]\nsize_mm = " + "9" * 10_000,
     "material lacks poisson": "[body.material]\ndensity_kg_m3 = 1000\nshear_modulus_pa = 1e4",
     "material has a key of its own": "[body.material]\nyoung_pa = 1e4\n" + MATERIAL,

@@ -53,9 +53,10 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     off = np.abs(level_set(palm, points[_on_boundary(cells).ravel()])).max()
     if sharpest < SHARPEST or off > OFF * palm.thickness:
         raise MeshError(
-            f"a mapped mesh of this palm has a smallest dihedral angle of {sharpest:.2g} degrees "
-            f"(limit {SHARPEST:g} degrees) and misses its surface by {1e3 * off:.2g} mm; use a "
-            "lower relief"
+            "this palm cannot be meshed, because its relief is too steep: the smallest angle "
+            f"between faces is {sharpest:.2g} degrees, and the surface is missed by "
+            f"{1e3 * off:.2g} mm; reduce thenar_height_mm, hypothenar_height_mm, pad_height_mm or "
+            "cup_depth_mm, or use a mesh from a file"
         )
     mesh = quadratic(TetMesh(points=points, tets=tets))
     mesh = curve_boundary(mesh, lambda p: level_set(palm, p), lambda p: gradient(palm, p))

@@ -9,7 +9,6 @@ import fem
 from fem.load_and_probe import facet_points
 from meshes import (
     Grading,
-    MeshError,
     TetMesh,
     boundary_facets,
     graded_axis,
@@ -17,7 +16,7 @@ from meshes import (
 )
 from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
-from meshes.shapes.structured import Lines, mirror_line
+from meshes.shapes.structured import Lines, check_size, mirror_line
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
@@ -39,14 +38,7 @@ def discretise(body: Body, h: float) -> Discretised:
 
     The support below represents bone; those at both ends represent the tissue that was cut off.
     """
-    try:
-        mesh = mapped_palm(body.palm, *grid_lines(body, h))
-    except MeshError as error:
-        raise MeshError(
-            "this palm cannot be meshed, because its relief is too steep; reduce "
-            "thenar_height_mm, hypothenar_height_mm, pad_height_mm or cup_depth_mm, or use a "
-            "mesh from a file"
-        ) from error
+    mesh = mapped_palm(body.palm, *grid_lines(body, h))
     mesh = replace(mesh, facets={"top": mesh.facets["top"]})
     return in_tissue_layers(body, h, mesh, partial(_support, body))
 
@@ -84,6 +76,7 @@ PALM = register(
         keys=("relief",),
         presets={"palm": {"width": 0.085}},  # of the effective homogeneous soft tissue of a palm
         check=lambda body: body.palm,
+        check_size=lambda body, h: check_size(len(line) - 1 for line in grid_lines(body, h)),
         discretise=discretise,
         grid_lines=grid_lines,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),

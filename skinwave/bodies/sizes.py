@@ -21,8 +21,27 @@ THICKEST, AT = 0.1, 400.0  # coat over a shear wavelength at Hz, the highest lin
 
 
 def check_mesh(body: Body, h: float) -> None:
-    """Refuse elements of h in m that are larger than the body or too many."""
-    body.of_kind.check_size(body, check_element_size(body, h))
+    """Refuse elements of h in m that are larger than the body or too many; say which size works."""
+    check_element_size(body, h)
+    try:
+        body.of_kind.check_size(body, h)
+    except ValueError as error:
+        reason = str(error).partition(";")[0]
+        larger = (float(f"{h * 10 ** (k / 20):.2g}") for k in range(1, 200))
+        size = next((each for each in larger if _has_mesh(body, each)), None)
+        cure = f"use elements of {1e3 * size:g} mm, or " if size else "use "
+        raise ValueError(
+            f"elements of {1e3 * h:.3g} mm are too many: {reason}; {cure}a smaller body"
+        ) from None
+
+
+def _has_mesh(body: Body, h: float) -> bool:
+    """Whether a body can be meshed with elements of h in m."""
+    try:
+        body.of_kind.check_size(body, check_element_size(body, h))
+    except ValueError:
+        return False
+    return True
 
 
 def check_element_size(body: Body, h: float, slack: float = 1.0) -> float:

@@ -8,11 +8,12 @@ import errno
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import skinwave
+from simple_model.choices import SHORTEST_PART, suggestion
 from skinwave.commands import COMMANDS
-from skinwave.commands.common import note_central_values
+from skinwave.commands.common import note_scenes
 from skinwave.system import extensions
 from skinwave.system.plain_text import printable, say
 from skinwave.system.processes import SAFE_PATH, environment
@@ -56,7 +57,7 @@ def _command(typed: list[str]) -> int:
     options.typed = typed
     no_cache = {CACHE: ""} if getattr(options, "no_cache", False) else {}
     with environment({**SAFE_PATH, **no_cache}):
-        note_central_values(options)
+        note_scenes(options)
         return int(options.command(options))
 
 
@@ -83,7 +84,24 @@ def _join_up_option(arguments: Sequence[str]) -> list[str]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Argument parser whose errors are one sentence."""
+    """Argument parser whose errors are one sentence, and whose options have no abbreviations."""
+
+    def __init__(self, **how: Any) -> None:
+        super().__init__(allow_abbrev=False, **how)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse unknown options in the parser of their command, which knows similar ones."""
+        known, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            given = unknown[0].partition("=")[0]
+            names = {name: action for action in self._actions for name in action.option_strings}
+            word = given.strip("-")
+            near = [name for name, action in names.items() if action.dest == word]
+            near = near or [name for name in names if len(word) >= SHORTEST_PART and word in name]
+            hint = f"; use {near[0]}" if near else suggestion(given, names)
+            what = "option" if given.startswith("-") else "argument"
+            self.error(f"unrecognized {what} {given}{hint}")
+        return known, unknown
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"skinwave: {printable(message, keep='')}; see {self.prog} --help\n")

@@ -141,25 +141,34 @@ def check_seed(seed: int) -> None:
         raise ValueError(f"--seed is {seed}; give 0 or a positive whole number")
 
 
-def note_central_values(options: argparse.Namespace) -> None:
-    """Print a note if the command ignores the spreads of a scene.
+def note_scenes(options: argparse.Namespace) -> None:
+    """Warn of implausible numbers in the scenes of a command, unless the warnings of its responses
+    do, and print a note if it ignores their spreads.
 
     The command itself refuses a file that cannot be read.
     """
-    path, name = getattr(options, "scene", None), options.command_name
-    samples = (name == "run" and options.samples is not None) or getattr(options, "best", None)
-    if samples or name == "plan" or not isinstance(path, Path) or not path.is_file():
-        return
-    if getattr(options, "quiet", False):
-        return
+    from skinwave.planning.plan_warnings import implausible
     from skinwave.scene.file import read
 
-    with warnings.catch_warnings(), suppress(ValueError):
-        warnings.simplefilter("ignore")
-        if spreads := read(path).spreads:
-            keys = ", ".join(key for key, _ in spreads)
-            say(f"skinwave: uses the central values of {keys}; skinwave run --samples N samples "
-                "their distributions", sys.stderr)  # fmt: skip
+    name = options.command_name
+    paths = [getattr(options, "scene", None), *getattr(options, "scenes", [])]
+    for path in paths:
+        with warnings.catch_warnings(), suppress(ValueError):
+            warnings.simplefilter("ignore")
+            if not isinstance(path, Path) or not path.is_file():
+                continue
+            scene = read(path)
+            if name not in ("plan", "run"):
+                warn(implausible(scene))
+            samples = (name == "run" and options.samples is not None) or getattr(
+                options, "best", None
+            )
+            if scene.spreads and not (
+                samples or name == "plan" or getattr(options, "quiet", False)
+            ):
+                keys = ", ".join(key for key, _ in scene.spreads)
+                say(f"skinwave: uses the central values of {keys}; skinwave run --samples N "
+                    "samples their distributions", sys.stderr)  # fmt: skip
 
 
 @contextmanager

@@ -4,7 +4,7 @@ Importing this package loads no numerical library, because the command line list
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -123,6 +123,9 @@ def register(model: Model) -> Model:
     """
     if model.name in BUILT_IN and not model.solve.__module__.startswith(f"{__name__}."):
         raise ValueError(f"'{model.name}' is registered already; choose another name")
+    from skinwave.models.options import underflow_to_zero
+
+    model = replace(model, solve=underflow_to_zero()(model.solve))
     extensions.add(_MODELS, model.name, model, model.solve)
     return model
 

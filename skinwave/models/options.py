@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -71,6 +73,16 @@ class SolveOptions:
 
 
 DEFAULT = SolveOptions()
+
+
+@contextmanager
+def underflow_to_zero() -> Iterator[None]:
+    """Round underflow to 0 even if the caller lets NumPy raise it: decaying exponentials end in 0.
+
+    It decorates the entries of all computing: plans, reductions and the `solve` of models.
+    """
+    with np.errstate(under="ignore"):
+        yield
 
 
 def solver_name(solver: str) -> str:

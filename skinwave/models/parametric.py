@@ -50,7 +50,7 @@ from skinwave.models.free_keys import (
     with_values,
 )
 from skinwave.models.laws import relaxing
-from skinwave.models.options import solver_name
+from skinwave.models.options import solver_name, underflow_to_zero
 from skinwave.models.reduced import (
     BAND,
     ReducedBody,
@@ -110,6 +110,7 @@ class ParametricBody:
         return f"<ParametricBody of {self.scene!r}: {free}; {order}>"
 
 
+@underflow_to_zero()
 def prepare(
     scene: Scene,
     free: Mapping[str, tuple[float, float]],
@@ -321,6 +322,7 @@ def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]
     return prepared.frequencies, motion * meshed.line_factor(quantity, s, (), motion.shape[1])
 
 
+@underflow_to_zero()
 def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
     """Return the response from rest to the scene's Tacton, for values of the free keys."""
     return answer_of(at(prepared, values), prepared.scene)

@@ -35,7 +35,13 @@ from skinwave.bodies.sheet import air
 from skinwave.bodies.sizes import default_size
 from skinwave.models import meshed
 from skinwave.models.laws import relaxing
-from skinwave.models.options import DEFAULT, SolveOptions, sample_times, solver_name
+from skinwave.models.options import (
+    DEFAULT,
+    SolveOptions,
+    sample_times,
+    solver_name,
+    underflow_to_zero,
+)
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import SURFACE, Body, Reading, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
@@ -104,6 +110,7 @@ class ReducedResponse:
     radiated: float
 
 
+@underflow_to_zero()
 def prepare(
     scene: Scene,
     options: SolveOptions = DEFAULT,
@@ -300,6 +307,7 @@ def respond(
     )  # fmt: skip
 
 
+@underflow_to_zero()
 def answer(
     reduced: ReducedBody,
     scene: Scene,

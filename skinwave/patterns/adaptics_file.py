@@ -9,9 +9,9 @@ from math import cos, radians, sin
 from operator import add, ge, gt, le, lt, mul, sub, truediv
 from typing import Any
 
+from meshes import reading
 from simple_model.choices import choose
 from skinwave.system.json_kinds import is_finite_number
-from skinwave.system.plain_text import as_utf_8
 
 FORMAT = "MidAirHapticsAnimationFileFormat"
 REVISIONS = ("0.0.10-alpha.1", "0.1.0-alpha.2", "0.1.0-alpha.3")
@@ -72,7 +72,7 @@ class Animation:
 def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
     """Parse a file; `parameters` replace the default values of its parameters."""
     try:
-        table = json.loads(as_utf_8(content))
+        table = json.loads(reading.decode(content))
     except (ValueError, RecursionError) as error:
         place = f" at line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         raise ValueError(f"the file is not valid JSON{place}; save it with AdapTics") from None

@@ -3,9 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from meshes import reading
+from simple_model.numbers import percent
 from skinwave.patterns import adaptics, adaptics_out, autd3, focal_points, waveform
-from skinwave.patterns.pattern import Options, onto, resize, wide_enough
+from skinwave.patterns.pattern import Options, Pattern, onto, resize, wide_enough
 from skinwave.scene import file as scene_file
 from skinwave.scene.scene import Body, Scene, check_load
 
@@ -59,10 +62,7 @@ def read_pattern(
     receiver = base or scene_file.loads("")
     content = reading.read_bytes(path, LARGEST[suffix])
     try:
-        if suffix == ".wav":
-            pattern = waveform.read(content, options, receiver)
-        else:
-            pattern = {".adaptics": adaptics, ".csv": focal_points}[suffix].read(content, options)
+        pattern = _read_content(content, suffix, options, receiver)
         tacton = resize(pattern.tacton, options.resize)
         notes = list(pattern.notes)
         receiver = base or wide_enough(receiver, tacton, notes)
@@ -71,10 +71,51 @@ def read_pattern(
         raise ValueError(f"{path}: {error}") from None
 
 
+def _read_content(content: bytes, suffix: str, options: Options, receiver: Scene) -> Pattern:
+    if suffix == ".wav":
+        return waveform.read(content, options, receiver)
+    return {".adaptics": adaptics, ".csv": focal_points}[suffix].read(content, options)
+
+
 def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, tuple[str, ...]]:
     """Return a scene in the format of a suffix, and notes; see `convert` for errors."""
     if suffix == ".toml":
         return scene_file.dumps(scene).encode(), ()
     check_load(scene, "a pattern of a device")
     modules = {".adaptics": adaptics_out, ".csv": focal_points, ".py": autd3}
-    return modules[suffix].write(scene, options)
+    content, notes = modules[suffix].write(scene, options)
+    return content, (*notes, *_change_notes(scene, content, suffix))
+
+
+def _change_notes(scene: Scene, content: bytes, suffix: str, most: int = 5000) -> list[str]:
+    """Return a note on the change of the load in a file that can be read back, of a CSV by its
+    first `most` samples.
+    """
+    if suffix not in READERS:
+        return []
+    is_csv = suffix == ".csv"
+    if is_csv:
+        rows = 1 + most * len(scene.tacton.foci)
+        content = b"".join(content.splitlines(keepends=True)[:rows])
+    changes = []
+    for way in ("", " with --hold")[: 1 + is_csv]:
+        try:
+            pattern = _read_content(content, suffix, Options(hold=bool(way)), scene)
+        except ValueError as error:
+            return [f"the change of the load is unknown, because it cannot be read back: {error}"]
+        change = load_change(scene, onto(scene, pattern, scene.name))
+        changes.append(f"{percent(change) if change >= 1e-4 else 'less than 0.01 %'}{way}")
+    return [f"read back, the load on the path changes by {', '.join(changes)} (root mean square)"]
+
+
+def load_change(scene: Scene, other: Scene, places: int = 16, instants: int = 4000) -> float:
+    """Return the difference in pressure of another scene on the path of a scene, relative to its
+    pressure, as root mean squares over the shorter of both.
+    """
+    golden = (5**0.5 - 1) / 2  # its multiples are spread evenly, and in step with no period
+    duration = min(scene.tacton.duration, other.tacton.duration)
+    times = duration * np.sort(np.arange(instants) * golden % 1)
+    points = scene.tacton.trajectory.at_phase(np.arange(places) / places)
+    before, after = (each.pressure(points, times) for each in (scene, other))
+    size = float(np.linalg.norm(before))
+    return float(np.linalg.norm(after - before)) / size if size else 0.0

@@ -12,12 +12,13 @@ from math import isfinite
 
 import numpy as np
 
+from meshes import reading
 from simple_model import Tacton, Trajectory, even_phases
 from simple_model.choices import suggestion
 from simple_model.load.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, aliasing_notes, loudness, one_height
 from skinwave.scene.scene import Scene
-from skinwave.system.plain_text import as_utf_8, csv_table, number_in
+from skinwave.system.plain_text import csv_table, number_in
 from skinwave.typing import Floats
 
 COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
@@ -29,6 +30,7 @@ WORDS = {
 UNITS = {"t_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "lengths": {"m": 1.0, "cm": 1e-2, "mm": 1e-3}}
 DEVICE_RATE = 40_000.0  # Hz
 MOST_ROWS = 1_000_000
+LARGEST = 1e15  # of numbers in a file: also of timestamps in us
 
 
 def read(content: bytes, options: Options) -> Pattern:
@@ -134,7 +136,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:
     """Return line numbers and fields of the lines that are neither empty nor comments."""
-    lines = as_utf_8(content).splitlines()
+    lines = reading.decode(content).splitlines()
     if len(lines) > MOST_ROWS:
         raise ValueError(f"the file has more than {MOST_ROWS:,} lines; shorten the pattern")
     kept = [(k, x) for k, x in enumerate(lines, 1) if x.strip(" ,;\t") and not x.startswith("#")]
@@ -177,8 +179,8 @@ def _columns_of_width(
             f"the file has no header; begin it with columns of {','.join(COLUMNS)}, or write only "
             "x,y[,z[,intensity]] and give the samples per second with --rate HZ"
         )
-    if not (isfinite(rate) and rate > 0):
-        raise ValueError(f"--rate is {rate} Hz; give a finite number above 0")
+    if not 1 / LARGEST < rate < LARGEST:
+        raise ValueError(f"--rate is {rate} Hz; give a number of samples per second, such as 1000")
     return [(name, 1.0) for name in ("x_m", "y_m", "z_m", "intensity")[:width]]
 
 
@@ -198,7 +200,9 @@ def _numbers(line: int, cells: list[str], count: int) -> list[float]:
         raise ValueError(
             f"line {line} has {len(cells)} columns, but the first has {count}; correct it"
         )
-    values = [x for cell in cells if (x := number_in(cell)) is not None and isfinite(x)]
+    values = [x for cell in cells if (x := number_in(cell)) is not None and abs(x) < LARGEST]
     if len(values) < count:
-        raise ValueError(f"line {line}, '{','.join(cells)[:60]}', must contain only finite numbers")
+        raise ValueError(
+            f"line {line}, '{','.join(cells)[:60]}', must contain only numbers below {LARGEST:g}"
+        )
     return values

@@ -17,6 +17,7 @@ from skinwave.typing import Floats
 
 SCALES = ("full", "peak", "rms")
 CLIPPED = 0.02  # beyond full drive that is clipped: the rounding of a sine with 8 bits
+LEAST_PEAK = 1e-12  # of full scale, and its inverse: other peaks are damaged numbers
 RESOLUTION = 2.0**-15  # of full scale, that of 16 bits: an envelope may be below 0 by rounding
 
 
@@ -74,9 +75,15 @@ def _decode(content: bytes) -> tuple[int, Floats]:
 
 def _scale(samples: Floats, scale: str) -> tuple[Floats, str]:
     """Return scaled samples (k,), and the scale in words."""
-    peak, rms = float(np.abs(samples).max()), float(np.sqrt(np.mean(samples**2)))
+    peak = float(np.abs(samples).max())
     if peak == 0:
         raise ValueError("the WAV is silent; export it again")
+    if not LEAST_PEAK < peak < 1 / LEAST_PEAK:
+        raise ValueError(
+            f"the WAV has a peak of {peak:.3g} of full scale, which no recording has; export it "
+            "again with a peak of 1"
+        )
+    rms = float(np.sqrt(np.mean(samples**2)))
     factor = {"full": 1.0, "peak": 1 / peak, "rms": np.sqrt(0.5) / rms}[scale]
     if factor * peak > 1 + CLIPPED:
         raise ValueError(

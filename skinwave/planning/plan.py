@@ -18,12 +18,19 @@ from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.laws import check_laws, own_laws, series_tolerance
 from skinwave.models.limits import beyond, check_takes, default_model, refusal, takers, takes
 from skinwave.models.linear_elements import FEM, TRANSIENT_RATE, step_count
-from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_times
+from skinwave.models.options import (
+    DEFAULT,
+    SolveOptions,
+    sample_grid,
+    sample_times,
+    underflow_to_zero,
+)
 from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED, thin_plate_part
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import answer
 from skinwave.planning import errors, estimates, left_out
 from skinwave.planning.extent import absorbing_error, extent, symmetry
+from skinwave.planning.plan_warnings import implausible
 from skinwave.planning.record import Plan, PlanRow
 from skinwave.planning.refinement import above_band, refine
 from skinwave.planning.rows import element_rows, neglected_rows
@@ -64,6 +71,7 @@ class _Request:
         return PlanRow(what="model", value=self.model.name, reason=reason)
 
 
+@underflow_to_zero()
 def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     """Plan a scene's simulation to a relative error in its probes' waveforms.
 
@@ -102,14 +110,15 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
         statement = Statement(parts=(THE_LOAD,), tolerance=tolerance)
         return Plan(
             model=model.name, body=scene.body, rows=(request.model_row(), _error_row(statement)),
-            statement=statement, options=options,
+            statement=statement, options=options, cautions=implausible(scene),
         )  # fmt: skip
     planned, parts = (_plan_elements if model.is_refined else _plan_without_mesh)(request)
     scene = replace(scene, body=planned.body)
     parts += errors.left_out_parts(scene, model, tolerance, planned.prepared)
     statement = Statement(parts=tuple(parts), tolerance=tolerance)
     rows = (*planned.rows, *_law_rows(scene, model, tolerance), _error_row(statement))
-    return replace(planned, statement=statement, rows=rows, options=options)
+    cautions = (*planned.cautions, *implausible(scene))
+    return replace(planned, statement=statement, rows=rows, options=options, cautions=cautions)
 
 
 def _error_row(statement: Statement) -> PlanRow:

@@ -1,6 +1,6 @@
 """Warnings of a response that differs from the request, apart from its expected error."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +9,7 @@ from simple_model import Response, Statement
 from simple_model.load.line_names import line_names
 from simple_model.load.sampling import step
 from simple_model.numbers import EN_DASH, significant
+from simple_model.response import resolution
 from skinwave.models import named
 from skinwave.models.limits import cures_for, in_words
 from skinwave.planning.estimates import mean_gain
@@ -17,6 +18,8 @@ from skinwave.scene.scene import Scene
 
 NONLINEAR = "plate-modes-nonlinear", "fem-nonlinear"  # the cheaper first
 DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
+LOSS = "loss_factor"
+WithRange = tuple[str, float, str, float, float, str]  # key, value, whose range, low, high, unit
 WEAK_LINE_RATIO = 0.05  # of the strongest line of a load: no warning if weaker ones are left out
 
 
@@ -32,9 +35,10 @@ def stated(
 def response_warnings(scene: Scene, response: Response) -> tuple[str, ...]:
     """Return warnings of a response beyond those of its plan."""
     return (
+        *implausible(scene),  # first, as at the end of those of the plan
         *large_deflection(scene, response),
         *lines_left_out(scene, response),
-        *implausible(scene),
+        *lines_unresolved(scene, response),
     )
 
 
@@ -69,24 +73,60 @@ def lines_left_out(scene: Scene, response: Response) -> tuple[str, ...]:
     )
 
 
+def lines_unresolved(scene: Scene, response: Response) -> tuple[str, ...]:
+    """Warn of a response too short for the strongest line of its load."""
+    lines = line_names(scene.pressure, WEAK_LINE_RATIO)
+    least = resolution(response)
+    moving = np.where(lines.frequencies > 0, lines.strengths, 0.0)
+    if not moving.any() or (f := lines.frequencies[moving.argmax()]) >= least:
+        return ()
+    length = np.ptp(response.times)
+    return (
+        f"the response of {1e3 * length:.3g} ms is too short for the strongest line of the load, "
+        f"{lines.names[moving.argmax()]} at {f:.4g} Hz, so that tables of lines leave it out; use "
+        f"duration_s = {1.1 * length * least / f:.2g} or more",
+    )
+
+
 def implausible(scene: Scene) -> tuple[str, ...]:
-    """Warn of a density that no solid has, and of a probe that is given twice."""
-    warnings = []
-    lightest, heaviest = DENSITIES
-    if scene.body.of_kind.discretise:
-        warnings += [
-            f"density_kg_m3 = {density:g} is implausible; solids have "
-            f"{lightest:g}{EN_DASH}{heaviest:g} "
-            "kg/m³, so check its unit"
-            for density in sorted({solid.density for solid in scene.body.solids})
-            if not lightest <= density <= heaviest
-        ]
+    """Warn of numbers that probably have another unit, and of a probe that is given twice."""
+    warnings = [
+        f"{key} = {value:g} is implausible; {whose} {low:g}{EN_DASH}{high:g}{unit}, so check "
+        f"{'whether it is a quality factor Q: write 1 / Q' if key == LOSS else 'its unit'}"
+        for key, value, whose, low, high, unit in sorted({*_with_ranges(scene)})
+        if 0 < value < low or high < value < np.inf
+    ]
     places = [(*probe, depth) for probe, depth in zip(scene.probes, scene.depths, strict=True)]
     warnings += [
         f"points_mm contains ({1e3 * x:g}, {1e3 * y:g}) mm more than once; remove the duplicate"
         for x, y, _ in sorted({place for place in places if places.count(place) > 1})
     ]
     return tuple(warnings)
+
+
+def _with_ranges(scene: Scene) -> Iterator[WithRange]:
+    """Yield numbers of a scene whose unit may be wrong, each with the range that it usually has."""
+    body, kind, trajectory = scene.body, scene.body.of_kind, scene.tacton.trajectory
+    if scene.load.of_kind.is_of_device:
+        path = 1e3 * float(np.ptp(trajectory.outline, axis=0).max())
+        yield "size_mm" if trajectory.size else "points_mm", path, "paths have", 0.5, 1e3, " mm"
+        yield "speed_m_per_s", trajectory.speed, "paths have", 0, 340, " m/s"
+    farthest = 1e3 * float(np.abs(scene.probes).max())
+    yield "points_mm", farthest, "the farthest probes are at", 0.1, 1e4, " mm"
+    if not kind.discretise:
+        return
+    for solid in body.solids:
+        yield "density_kg_m3", solid.density, "solids have", *DENSITIES, " kg/m³"
+        yield "shear_modulus_pa", solid.shear_modulus, "solids have", 100, 1e12, " Pa"
+        yield LOSS, solid.loss_factor, "solids have", 0, 2, ""
+    thinnest = 1e-3 if kind.is_plate else 0.1
+    for layer in body.layers:
+        yield "thickness_mm", 1e3 * layer.thickness, "layers have", 1e-3, 1e3, " mm"
+    if not kind.is_bounded:
+        return
+    yield "thickness_mm", 1e3 * body.depth, f"bodies of kind {kind.name} have", thinnest, 1e3, " mm"
+    for key, side in (("size_x_mm", body.width), ("size_y_mm", body.height)):
+        yield key, 1e3 * side, "bodies have", 1, 1e4, " mm"
 
 
 def rigid_body_drift(scene: Scene) -> tuple[str, ...]:

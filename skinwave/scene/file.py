@@ -37,7 +37,13 @@ from skinwave.scene.material_file import with_tables
 from skinwave.scene.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
 
 PAIRS = re.compile(r"\[\s+(-?\d[\d.e+-]*),\s+(-?\d[\d.e+-]*),\s+\]")  # each number on its own line
+SCENE = "a scene, which is TOML text of keys such as size_mm = 20 below a header such as [tacton]"
 CURE = "write key = value, with each key once, texts in quotes, and numbers such as 0.5"
+DEEPEST = 100  # parts of a key, or tables in each other; those of a scene have at most seven
+TOO_DEEP = (
+    "keys or brackets are nested too deeply; write keys such as thickness_mm = 10 below a header "
+    "such as [body]"
+)
 PATHS = "write a Windows path in single quotes, 'C:\\hand.stl', or with /, \"C:/hand.stl\""
 
 
@@ -51,7 +57,7 @@ def read(path: str | Path) -> Scene:
     >>> read("scene.toml").tacton.am_frequency
     140.0
     """
-    text = reading.read_text(path)
+    text = reading.read_text(path, must=SCENE)
     try:
         scene = from_table(parse_toml(text, Path(path).parent))
         if scene.body.file:  # relative to the scene file
@@ -75,14 +81,23 @@ def loads(text: str) -> Scene:
 
 def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
     """Return the table of a TOML text; numbers replace the modulus files in a folder."""
+    if max(map(_parts, re.split(r"[\n#={,]", text))) > DEEPEST:
+        raise ValueError(
+            TOO_DEEP
+        )  # the parser takes a time that is quadratic in the parts of a key
     try:
         table = tomllib.loads(text)
     except ValueError as error:
         raise ValueError(_not_toml(text, str(error))) from None
     except RecursionError:
-        raise ValueError("not valid TOML: brackets are nested too deeply") from None
+        raise ValueError(TOO_DEEP) from None
     _check_texts({key: value for key, value in table.items() if key != "name"})
     return with_tables(table, folder) if folder else table
+
+
+def _parts(text: str) -> int:
+    """Number of parts of a dotted key, without empty ones, which a line of dots has."""
+    return sum(1 for part in text.split(".") if part.strip())
 
 
 def _not_toml(text: str, error: str) -> str:
@@ -97,12 +112,16 @@ def _not_toml(text: str, error: str) -> str:
     return f"not valid TOML: line {k} is {line[:60]}; {cure}"
 
 
-def _check_texts(table: Mapping[str, Any]) -> None:
-    """Refuse control characters, which result from backslashes of a path in double quotes."""
+def _check_texts(table: Mapping[str, Any], depth: int = 1) -> None:
+    """Refuse tables too deep for recursion, and control characters, which result from backslashes
+    of a path in double quotes.
+    """
+    if depth > DEEPEST:
+        raise ValueError(TOO_DEEP)
     for key, value in table.items():
         for each in value if isinstance(value, list) else [value]:
             if isinstance(each, dict):
-                _check_texts(each)
+                _check_texts(each, depth + 1)
             elif isinstance(each, str) and not each.isprintable():
                 raise ValueError(f"{key} = {each[:60]!r} has a control character; {PATHS}")
 

@@ -10,11 +10,12 @@ from math import inf, isfinite, nextafter, pi
 from typing import Any
 
 from simple_model import DRIVES, DriveLaw, Material, ModulusTable, PronyTerm, Rhythm, Signal
-from simple_model.choices import choose, suggestion
+from simple_model.choices import choose
 from simple_model.layers.material import PRESETS
 from simple_model.layers.modulus_laws import COLUMNS
 from simple_model.load.focus import FOCI, FocalSpot
 from simple_model.load.trajectory import Points
+from skinwave.scene.key_hints import key_hint
 from skinwave.scene.load import SupportMotion
 from skinwave.scene.material_file import material_of, modulus_columns, values_of
 from skinwave.scene.scene import Layer, Mounting, Phalanx, Relief, Sides, solid_of
@@ -402,7 +403,7 @@ def read_keys(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dic
     for key, value in table.items():
         if key not in keys:
             others = [f"[{name}]" for name, known in SECTIONS.items() if key in known]
-            hint = f"; move it to {' or '.join(others)}" if others else suggestion(key, keys)
+            hint = f"; move it to {' or '.join(others)}" if others else key_hint(key, keys, value)
             hint = hint or f"; use one of {', '.join(keys)}"
             raise ValueError(f"{where} has the unknown key {key[:60]!r}{hint}")
         field = keys[key]

@@ -14,9 +14,10 @@ import numpy as np
 import tomli_w
 
 from meshes import reading
-from simple_model.choices import choose, suggestion
+from simple_model.choices import choose
 from skinwave.scene.distributions import Spread, parse_distribution, uniform
 from skinwave.scene.file import (
+    DEEPEST,
     dumps,
     from_table,
     loads,
@@ -25,6 +26,7 @@ from skinwave.scene.file import (
     to_table,
     without_spreads,
 )
+from skinwave.scene.key_hints import key_hint
 from skinwave.scene.keys import SCALES, SECTIONS, with_value
 from skinwave.scene.scene import BODIES, Body, Scene, solid_of, with_body
 from skinwave.scene.spreads import PRESSURE
@@ -248,17 +250,18 @@ def _check_count(count: int) -> None:
 def _checked_key(key: str) -> str:
     """The key, if scenes have it; keys inside a value, like material.poisson, are checked later."""
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
-    if key != BODY and ".".join(key.split(".")[:2]) not in known:
-        hint = suggestion(key, known) or "; write a key such as tacton.size_mm"
-        raise ValueError(f"'{key}' is not a key of a scene{hint}")
+    section, _, name = key.partition(".")
+    if key != BODY and (key.count(".") > DEEPEST or f"{section}.{name.split('.')[0]}" not in known):
+        hint = key_hint(key, known) or "; write a key such as tacton.size_mm"
+        raise ValueError(f"'{key[:60]}' is not a key of a scene{hint}")
     return key
 
 
 def _values(text: str) -> list[Any]:
     """Values separated by commas, as in a scene file, or words without quotes."""
     try:
-        return list(tomllib.loads(f"values = [{text}]")["values"])
-    except (tomllib.TOMLDecodeError, RecursionError):
+        return list(parse_toml(f"values = [{text}]")["values"])
+    except ValueError:
         parts = [part.strip() for part in text.split(",")]
         numbers = list(map(number_in, parts))
         return [part if x is None else x for part, x in zip(parts, numbers, strict=True)]

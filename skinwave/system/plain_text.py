@@ -40,17 +40,6 @@ def csv_table(
     return text.getvalue().encode()
 
 
-def as_utf_8(content: bytes) -> str:
-    """Decode a file as UTF-8, without a byte order mark; raise a ValueError if it is not UTF-8."""
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise ValueError("the file is not text in UTF-8; save it as UTF-8") from None
-    if "\0" in text:
-        raise ValueError("the file is not text in UTF-8, but binary or UTF-16; save it as UTF-8")
-    return text
-
-
 def number_in(text: str) -> float | None:
     """Return the number in a text, or None."""
     try:

@@ -12,6 +12,8 @@ import pytest
 import read_results
 from corpus import GOOD, SMALL
 
+from skinwave import BODIES
+from skinwave.bodies.sizes import check_mesh
 from skinwave.commands.cli import main
 from skinwave.commands.common import progress_of
 
@@ -133,3 +135,25 @@ def test_an_error_above_the_tolerance_is_a_warning(tmp_path, capsys, monkeypatch
     assert main(["run", "scene.toml", "--model", "fem", "--tolerance", "0.001", "--quiet"]) == 0
     assert "warning: elements of" in capsys.readouterr().err
     assert "Take care: elements of" in read_results.page(tmp_path / "scene-out/index.html")
+
+
+def test_options_are_not_abbreviated_but_hinted(capsys):
+    for typed, hint in (
+        (["run", "x.toml", "--h", "3"], "unrecognized option --h; use --element-size"),
+        (["sweep", "x.toml", "--elem=3"], "unrecognized option --elem; use --element-size"),
+        (["plan", "x.toml", "--modle", "fem"], "did you mean '--model'?"),
+    ):
+        with pytest.raises(SystemExit, match="2"):
+            main(typed)
+        printed = capsys.readouterr()
+        assert hint in printed.err
+        assert not printed.out
+
+
+def test_a_size_too_fine_for_a_palm_names_one_that_works(scene, capsys):
+    scene.write_text("[body]\nkind = 'palm'\n")
+    assert main(["plan", str(scene), "--element-size", "0.2"]) == 2
+    size = re.search(r"0.2 mm are too many.*use elements of ([\d.]+) mm", capsys.readouterr().err)[
+        1
+    ]
+    check_mesh(BODIES["palm"], float(size) / 1e3)

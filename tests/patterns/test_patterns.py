@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -349,6 +350,9 @@ def malformed():
         "text.wav": b"RIFFxxxxWAVE" * 5,
         "silent.wav": wav(np.zeros(100, np.int16)),
         "stereo.wav": wav(np.ones((100, 2), np.int16)),
+        "huge.wav": wav(np.array([0, 1e308])),
+        "faint.wav": wav(np.array([0, 5e-324])),
+        "huge.csv": header + b"0,0,0,0,0.2,1\n0.1,0,1e308,0,1e308,1\n",
         "loud.wav": wav(np.array([1, 1.5], np.float32)),
         "what.txt": b"",
     }  # fmt: skip
@@ -373,6 +377,15 @@ def test_conversions_that_cannot_be_are_refused_in_one_line(tmp_path, monkeypatc
     Path("good.wav").write_bytes(wav(np.array([0.5, -0.5, 0.2], np.float32)))
     for arguments in WRONG_COMMANDS:
         refused("convert", *arguments.split())
+
+
+def test_the_change_of_the_load_by_a_conversion_is_said():
+    jumps = loads("[tacton]\nshape = 'line'\nsize_mm = 20\nspeed_m_per_s = 2\nsweep = 'one_way'\n")
+    (csv,) = (note for note in write_pattern(jumps, ".csv", Options())[1] if "read back" in note)
+    straight, held = (float(x) for x in re.findall(r"([\d.]+) %", csv))
+    assert straight > 3 > 1 > held  # a jump is a straight line over one sample
+    (said,) = (n for n in write_pattern(jumps, ".adaptics", Options())[1] if "read back" in n)
+    assert float(re.search(r"([\d.]+) %", said)[1]) > 3
 
 
 def test_a_rate_too_low_for_the_modulation_makes_a_note():

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import warnings
 from dataclasses import replace
 
@@ -27,6 +28,8 @@ SLAB = f'{AM}[body]\n{SMALL}sides = "clamped"\n{PROBES}'
 PAPER = f'{AM}[focus]\npeak_pressure_pa = PRESSURE\n[body]\nkind = "sheet"\nmaterial = "paper"\n'
 PAPER += "size_x_mm = 40\nsize_y_mm = 40\nthickness_mm = 0.1\n"
 PAPER += f'base = "free"\nsides = "clamped"\n{PROBES}'
+PLATE = "preset = 'paper-sheet'\nsides = 'clamped'"
+SMALL_BODY = f"{SMALL.replace('30', '50')}sides = 'clamped'"
 LOUD_PAPER, QUIET_PAPER = PAPER.replace("PRESSURE", "2000"), PAPER.replace("PRESSURE", "2")
 
 # Scene, arguments, and part of one of the warnings.
@@ -151,6 +154,54 @@ def test_implausible_densities_and_repeated_probes_are_warned_of():
     assert [sentence.partition(" ")[0] for sentence in warned] == ["density_kg_m3", "points_mm"]
 
 
+@pytest.mark.parametrize(
+    ("section", "number"),
+    [
+        ("body", "thickness_mm = 0.015"), ("probes", "points_mm = 0.02"),
+        ("tacton", "size_mm = 0.02"),
+        ("body.material", "density_kg_m3 = 1"), ("body.material", "shear_modulus_pa = 25"),
+        ("body.material", "loss_factor = 5"),
+    ],
+)  # fmt: skip
+def test_numbers_of_another_unit_are_warned_of(section, number):
+    solid = {"density_kg_m3": 1000, "shear_modulus_pa": 25e3, "poisson": 0.45}
+    key, _, value = number.partition(" = ")
+    table = {section: (solid if section == "body.material" else {}) | {key: float(value)}}
+    if section == "probes":
+        table = {"probes": {key: f"[[0, 0], [{value}, 0]]"}}
+    if section == "tacton":
+        table["tacton"] |= {"shape": "'circle'", "speed_m_per_s": 0.01}
+    lines = (f"[{s}]\n" + "\n".join(f"{k} = {v}" for k, v in t.items()) for s, t in table.items())
+    (sentence,) = implausible(loads("\n".join(lines)))
+    assert sentence.startswith(f"{number} is implausible")
+
+
+def test_implausible_numbers_are_warned_of_at_every_door(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = f"{AM}[body]\nkind = 'slab'\nthickness_mm = 0.015\n"
+    (tmp_path / "thin.toml").write_text(text)
+    for words in (
+        "plan thin.toml",
+        "run thin.toml",
+        "live thin.toml --no-selftest",
+        "sweep thin.toml --vary tacton.duration_s=0.05 --model flat-body-harmonic",
+    ):
+        assert main([*words.split(), "--quiet"]) == 0
+        assert capsys.readouterr().err.count("thickness_mm = 0.015 is implausible") == 1, words
+    assert any("0.015" in sentence for sentence in plan(loads(text)).warnings)
+    with pytest.warns(skinwave.SkinwaveWarning, match="0.015 is implausible"):
+        skinwave.simulate(loads(text))
+
+
+def test_a_response_too_short_for_its_lines_names_a_duration_that_works():
+    scene = "[tacton]\nam_frequency_hz = 140\nduration_s = {}\n[body]\nkind = 'none'"
+    with pytest.warns(skinwave.SkinwaveWarning, match="too short") as caught:
+        short = skinwave.simulate(loads(scene.format(0.003)))
+    assert not short.lines
+    (duration,) = re.findall(r"duration_s = ([\d.]+)", str(caught[0].message))
+    assert skinwave.simulate(loads(scene.format(duration))).lines
+
+
 def response_with(deflection, scene, model="fem"):
     times = np.arange(3) / 1e4
     motion = np.outer([0.0, -1.0, 0.5], np.ones(len(scene.probes))) * deflection
@@ -169,3 +220,18 @@ def test_a_sheet_is_linear_up_to_half_its_thickness():
     assert large_deflection(free, response_with(1.2e-3, free)) == ()  # all of it moves alike
     slab = loads(SLAB)
     assert large_deflection(slab, response_with(1.0, slab)) == ()
+
+
+@pytest.mark.parametrize(
+    ("model", "body"),
+    [
+        ("point-kernel", ""), ("flat-body", ""), ("flat-body-harmonic", "thickness_mm = inf"),
+        ("plate-modes", PLATE), ("plate-modes-transient", PLATE), ("plate-modes-nonlinear", PLATE),
+        ("fem", SMALL_BODY), ("fem-harmonic", SMALL_BODY), ("auto", ""),
+    ],
+)  # fmt: skip
+def test_callers_that_let_numpy_raise_get_the_same_response(model, body):
+    scene = loads(f"[tacton]\nam_frequency_hz = 140\nduration_s = 0.05\n[body]\n{body}")
+    with warnings.catch_warnings(), np.errstate(all="raise"):
+        warnings.simplefilter("ignore", skinwave.SkinwaveWarning)
+        assert skinwave.simulate(scene, model, 0.3).values.any()

@@ -1,6 +1,7 @@
 """Malformed input is refused in one line that says what is wrong, and leaves nothing behind."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -134,3 +135,47 @@ def test_a_silent_tacton_causes_no_motion():
     for model in ("point-kernel", "flat-body", "fem"):
         assert not compute(silent, model, tolerance=0.3, h=0.006).displacement.any()
     assert plan(silent, SolveOptions(tolerance=0.3, model="fem", h=0.006)).error < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [(b"\x89PNG\r\n\x1a\n\0\0", "a PNG picture"), (bytes(range(256)), "a binary file")],
+)
+def test_a_file_that_is_not_a_scene_is_called_by_its_kind(folder, capsys, content, kind):
+    (folder / "x.png").write_bytes(content)
+    printed = said(capsys, folder, ["run", "x.png"])
+    assert f"the file is {kind}, not a scene" in printed
+    assert "UTF-8" not in printed
+
+
+@pytest.mark.parametrize("name", ["a." * 3000 + "a", "body.material." + "a." * 3000 + "a"])
+def test_varied_keys_of_many_parts_are_refused(folder, capsys, name):
+    assert len(said(capsys, folder, ["sweep", "good.toml", "--vary", f"{name}=1,2"])) < 200
+
+
+@pytest.mark.parametrize(
+    ("key", "hint"),
+    [
+        ("quality_factor = 20", "write loss_factor = 1 / Q = 0.05"),
+        ("damping_ratio = 0.025", "write loss_factor = 2 zeta = 0.05"),
+        ("shear_modulus_kpa = 25", "write shear_modulus_pa = 1000 x shear_modulus_kpa = 25000"),
+        ("density_g_cm3 = 1.1", "write density_kg_m3 = 1000 x density_g_cm3 = 1100"),
+        ("poisson_ratio = 0.4", "did you mean 'poisson'?"),
+    ],
+)
+def test_keys_of_another_value_are_refused_with_the_conversion(key, hint):
+    with pytest.raises(ValueError, match=re.escape(hint)):
+        loads(f"[body.material]\n{key}")
+
+
+@pytest.mark.parametrize(
+    ("key", "hint"),
+    [
+        ("radius_mm = 10", "write size_mm = 2 radius = 20"),
+        ("speed_mm_per_s = 1000", "write speed_m_per_s = 0.001 x speed_mm_per_s = 1"),
+        ("duration_ms = 300", "write duration_s = 0.001 x duration_ms = 0.3"),
+    ],
+)
+def test_keys_in_another_unit_are_refused_with_the_number(key, hint):
+    with pytest.raises(ValueError, match=re.escape(hint)):
+        loads(f"[tacton]\n{key}")

@@ -14,7 +14,7 @@ from simple_model import Trajectory
 from simple_model.layers.compliance import slab
 from simple_model.layers.flat_body import path_operator, steady_lines
 from skinwave.commands.cli import main
-from skinwave.commands.common import note_central_values
+from skinwave.commands.common import note_scenes
 from skinwave.models.options import SolveOptions
 from skinwave.planning.budget import error_budget, mesh_row
 from skinwave.planning.simulate import compute
@@ -293,9 +293,9 @@ def test_commands_without_samples_note_the_central_values_once(tmp_path, capsys)
     path = tmp_path / "slab.toml"
     path.write_text(SLAB)
     asked = Namespace(scene=path, command_name="compare", samples=None)
-    note_central_values(asked)
+    note_scenes(asked)
     assert capsys.readouterr().err.count("focus.peak_pressure_pa") == 1
-    note_central_values(Namespace(scene=path, command_name="run", samples=8))
+    note_scenes(Namespace(scene=path, command_name="run", samples=8))
     path.write_text(SLAB.replace(NORMAL, "50"))
-    note_central_values(asked)
+    note_scenes(asked)
     assert capsys.readouterr().err == ""
