@@ -107,7 +107,7 @@ def align(
     away = lines.mean - result.apply(f, model)
     dof = 2 * away.size - (delay is None) - (gain is None)
     cost = 2 * float((weights * np.abs(away) ** 2).sum())
-    misfit = float(np.linalg.norm(away) / max(np.linalg.norm(lines.mean), 1e-300))
+    misfit = float(np.linalg.norm(away)) / max(float(np.linalg.norm(lines.mean)), 1e-300)
     is_known = bool((lines.variance > 0).any())
     freedom = PRIOR_FREEDOM + float(np.min(lines.freedom)) if is_known else 0.0
     beyond = beyond_noise(cost, dof, freedom) if dof > 0 else 0.0

@@ -139,7 +139,7 @@ def _beyond_noise(solution: Solution, test: Whiteness) -> float:
 def _misfit(solution: Solution) -> float:
     values = solution.problem.data.values
     away = solution.problem.predict(solution.u) - values
-    return float(np.linalg.norm(away) / max(np.linalg.norm(values), 1e-300))
+    return float(np.linalg.norm(away)) / max(float(np.linalg.norm(values)), 1e-300)
 
 
 def _estimate(solution: Solution, k: int, to_end: Floats, away: float) -> Estimate:
