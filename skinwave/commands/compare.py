@@ -95,8 +95,8 @@ def run(options: argparse.Namespace) -> int:
         f"{held} of {len(claims)} claims hold"
     )
     closing(
-        options, [sentence], runs=outcome.runs, planned=outcome.planned, claims_held=held,
-        claims_assessed=len(claims), warnings=outcome.warnings,
+        options, [*outcome.conclusions, sentence], runs=outcome.runs, planned=outcome.planned,
+        claims_held=held, claims_assessed=len(claims), warnings=outcome.warnings,
         seconds=round(outcome.seconds, 1), peak_memory_gib=round(memory, 2),
     )  # fmt: skip
     return 0 if outcome.runs == outcome.planned else 1

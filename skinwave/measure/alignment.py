@@ -11,6 +11,7 @@ from scipy.special import stdtrit
 
 from skinwave.measure.delays import correlation, maxima
 from skinwave.measure.lines import MeasuredLines
+from skinwave.measure.misfit import LARGEST_MISFIT, beyond_noise, systematic, unexplained
 from skinwave.typing import Floats
 
 AS_GOOD = 10.83  # of chi-square: 99.9 % of one degree of freedom
@@ -25,11 +26,14 @@ class Alignment:
 
     Parameters
     ----------
-    delay, delay_error : s, and its standard error from the noise, 0 for a given delay
-    gain, gain_error : in units of the measurement per unit of the model, and its standard error
+    delay, delay_error : s, and its standard error from noise and misfit: 0 for a given delay, nan
+        if unknown or if the model does not describe the record
+    gain, gain_error : in units of the measurement per unit of the model, and the same of it
     repeats : s, distance to the nearest other delay that fits equally well within the noise; inf if
         the window has none
     chi_square : chi-square of the residual per degree of freedom; 1 for noise
+    misfit, unexplained : RMS of the residual over that of the measured lines, and the part of it
+        beyond the noise
     """
 
     delay: float
@@ -38,6 +42,13 @@ class Alignment:
     gain_error: float
     repeats: float = np.inf
     chi_square: float = np.nan
+    misfit: float = np.nan
+    unexplained: float = 0.0
+
+    @property
+    def is_described(self) -> bool:
+        """Whether the model describes the record well enough for errors of gain and delay."""
+        return self.unexplained <= LARGEST_MISFIT
 
     def apply(self, frequencies: Floats, model: np.ndarray) -> np.ndarray:
         """Apply gain and delay to the amplitudes (f, p) of a model."""
@@ -69,7 +80,7 @@ def align(
 
     Returns
     -------
-    Alignment; its standard errors include only noise, which may vary between places
+    Alignment; noise may vary between places, and a misfit beyond the noise is systematic
 
     Raises
     ------
@@ -92,18 +103,30 @@ def align(
     fitted = height / size if gain is None else float(gain)
     turned = weights * (model * np.exp(-2j * np.pi * f * best)[:, None]).conj()
     scale = -1 / bend * np.sign(fitted) if -bend * fitted > 0 else np.inf
-    from_noise = _error(2j * np.pi * f[:, None] * turned, lines) * scale
-    result = Alignment(
-        delay=best, gain=fitted, repeats=repeats,
-        delay_error=0.0 if delay is not None else float(np.hypot(from_noise, lines.shift_error)),
-        gain_error=_error(turned, lines) / size if gain is None else 0.0,
-    )  # fmt: skip
+    result = Alignment(delay=best, gain=fitted, repeats=repeats, delay_error=0.0, gain_error=0.0)
     away = lines.mean - result.apply(f, model)
-    freedom = 2 * away.size - (delay is None) - (gain is None)
-    if freedom <= 0 or not (lines.variance > 0).any():
-        return result
-    chi_square = float(2 * (weights * np.abs(away) ** 2).sum() / freedom)
-    return replace(result, chi_square=chi_square)
+    dof = 2 * away.size - (delay is None) - (gain is None)
+    cost = 2 * float((weights * np.abs(away) ** 2).sum())
+    misfit = float(np.linalg.norm(away)) / max(float(np.linalg.norm(lines.mean)), 1e-300)
+    is_known = bool((lines.variance > 0).any())
+    freedom = PRIOR_FREEDOM + float(np.min(lines.freedom)) if is_known else 0.0
+    beyond = beyond_noise(cost, dof, freedom) if dof > 0 else 0.0
+    result = replace(
+        result, misfit=misfit, unexplained=unexplained(misfit, beyond, cost),
+        chi_square=cost / dof if dof > 0 and is_known else np.nan,
+    )  # fmt: skip
+
+    def error(factors: np.ndarray) -> float:
+        if not result.is_described or not (is_known or dof > 0):
+            return np.nan
+        along = float(np.sqrt((np.abs(factors) ** 2 / weights).sum() / 2))
+        return float(np.hypot(_error(factors, lines), systematic(beyond) / 1.96 * along))
+
+    of_delay = error(2j * np.pi * f[:, None] * turned) * scale
+    return replace(
+        result, gain_error=error(turned) / size if gain is None else 0.0,
+        delay_error=0.0 if delay is not None else float(np.hypot(of_delay, lines.shift_error)),
+    )  # fmt: skip
 
 
 def opposite_sign(model: str, has_delay: bool) -> str:

@@ -58,7 +58,6 @@ class ModelColumn:
     alignment: Alignment
     model: np.ndarray  # (f, p) complex, its lines with gain and delay
     p_values: Floats  # (f, p), of differences, adjusted for their number (Holm); nan if unknown
-    misfit: float  # RMS difference of the lines over that of the measured lines
     may_be_flipped: bool = False  # whether the opposite sign fits as well
 
     @property
@@ -194,13 +193,11 @@ def _column(measured: Measured, run: Run, lines: MeasuredLines) -> ModelColumn:
     aligned = partial(align, window=window, centre=centre, delay=measured.delay, gain=gain)
     best = aligned(lines, z)
     model = best.apply(lines.frequencies, z)
-    away = lines.mean - model
     flipped = aligned(replace(lines, each=-lines.each), z)
     fits = 2 * lines.variance.size * (flipped.chi_square - best.chi_square) < AS_GOOD
     is_nearer = abs(flipped.delay) < abs(best.delay) or flipped.chi_square < best.chi_square
     return ModelColumn(
-        run=run, alignment=best, model=model, p_values=holm(lines.p_values(away)),
-        misfit=float(np.linalg.norm(away) / np.linalg.norm(lines.mean)),
+        run=run, alignment=best, model=model, p_values=holm(lines.p_values(lines.mean - model)),
         may_be_flipped=bool(fits and is_nearer),
     )  # fmt: skip
 

@@ -21,6 +21,7 @@ from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.claims import FAILS, HOLDS
 from skinwave.measure.comparison import LEVEL, UNKNOWN, MeasuredComparison, ModelColumn, overlap
 from skinwave.measure.inspection import flaws, unsteady
+from skinwave.measure.misfit import LARGEST_MISFIT, NOT_DESCRIBED
 from skinwave.report.palette import label
 from skinwave.report.spectra import MOST_LINES, lines_figure
 from skinwave.results.claims import TEXTS
@@ -37,8 +38,9 @@ CAPTION = (
 )
 METHOD = (
     "Lines are fitted to each repetition by least squares. Gain and delay of each model follow "
-    "from all lines and places, weighted by noise; their standard errors contain only noise. A "
-    "difference is beyond the noise if its p-value, adjusted for the number of lines and "
+    "from all lines and places, weighted by noise. Their standard errors contain noise and a "
+    f"misfit beyond it; with a misfit above {percent(LARGEST_MISFIT)} there are none. A difference "
+    "is beyond the noise if its p-value, adjusted for the number of lines and "
     f"places (Holm), is below {100 * LEVEL:g} % (Victor & Mast 1991). The point kernels are "
     "pressures, and their gain has that unit."
 )
@@ -104,7 +106,7 @@ def columns_table(comparison: MeasuredComparison) -> Table:
         per = 1.0 if own == measured else measured.per_unit
         unit = "" if own == measured else f" {measured.shown} per {own.shown}"
         rows.append((
-            label(column.run.column), 100 * column.misfit, 100 * comparison.noise,
+            label(column.run.column), 100 * a.misfit, 100 * comparison.noise,
             f"{column.differs.sum()} of {known}" if known else UNKNOWN,
             _fit_parts(per * a.gain, per * a.gain_error) + unit,
             _fit_parts(1e3 * a.delay, 1e3 * a.delay_error), 1e3 * a.repeats,
@@ -170,10 +172,22 @@ def claims_table(comparison: MeasuredComparison) -> Table:
 
 
 def conclusion(comparison: MeasuredComparison, column: ModelColumn) -> str:
-    """Return whether, and where, a model agrees with the data."""
+    """Return whether, and where, a model agrees with the data, and what that does to gain and
+    delay.
+    """
+    if not column.alignment.is_described:
+        errors = f" {as_sentence(NOT_DESCRIBED)[:-1]}, so gain and delay have no errors."
+    elif column.alignment.unexplained:
+        errors = " The errors of gain and delay include the misfit."
+    else:
+        errors = ""
+    return _agreement(comparison, column) + errors
+
+
+def _agreement(comparison: MeasuredComparison, column: ModelColumn) -> str:
     name, differs, lines = label(column.run.column), column.differs, comparison.lines
     known = int(np.isfinite(column.p_values).sum())
-    misfit = f"The misfit is {share_of(column.misfit, 'the measured lines')}"
+    misfit = f"The misfit is {share_of(column.alignment.misfit, 'the measured lines')}"
     if not known:
         return (
             f"The noise of the data is unknown, so the agreement of the {name} cannot be tested. "

@@ -4,16 +4,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simple_model.numbers import percent, plural, share_of, significant
+from simple_model.numbers import as_sentence, percent, plural, share_of, significant
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.fit import Fit
 from skinwave.measure.inspection import flaws
 from skinwave.measure.intervals import Estimate
+from skinwave.measure.misfit import NOT_DESCRIBED
 from skinwave.measure.observed import first_names
 from skinwave.measure.parameters import DELAY
 
-MISFIT = 1.5  # chi squared over its degrees of freedom, for known errors
-POOR = 0.3  # residual over the measured motion
 LEAST_SHARE = 1e-3  # of the measured power in lines that are not fitted
 LEAST_PROBABILITY = 1e-9  # that is shown
 CORRELATED = 0.1  # smallest correlation that is mentioned
@@ -24,11 +23,13 @@ def sentences(result: Fit) -> list[str]:
     solution, data = result.solution, result.solution.problem.data
     ratio = significant(solution.cost / solution.dof)
     known = f"; chi squared over its degrees of freedom is {ratio}, with known errors"
+    none = f" {as_sentence(NOT_DESCRIBED)[:-1]}, so no estimate has an interval."
     return [
         f"{result.target.model} was fitted to {data.words}.",
         f"{solution.agreeing_starts} of {plural(len(solution.starts), 'start')} reached the "
         "solution.",
-        f"The residual is {share_of(result.misfit, 'the measured motion')}{known * data.is_known}.",
+        f"The residual is {share_of(result.misfit, 'the measured motion')}{known * data.is_known}."
+        f"{none * (not result.intervals.is_described)}",
         *(
             "{} = {}, 95 % interval {} to {}.".format(each.key, *round_to_interval(each))
             for each in result.estimates
@@ -58,10 +59,22 @@ def _of_solution(result: Fit) -> Iterator[str]:
     count = len(solution.starts)
     missed = count - solution.agreeing_starts
     strong = [line for line in solution.problem.data.left_out if line.share > 0]
-    if result.misfit > POOR and not (solution.problem.data.is_known and solution.scale < MISFIT):
+    left = share_of(result.intervals.unexplained, "the measured motion")
+    factor = significant(max(result.intervals.widenings.tolist(), default=1.0))
+    if not result.intervals.is_described:
         yield (
-            f"poor fit: {share_of(result.misfit, 'the measured motion')} is unexplained; check the "
-            "model and the scene"
+            f"poor fit: {NOT_DESCRIBED}, {left} is unexplained and no estimate has an interval; "
+            "check the model and the scene"
+        )
+    elif result.intervals.unexplained:
+        yield (
+            f"the misfit beyond the noise is {left}; intervals are widened for it by up to a "
+            f"factor of {factor}; check the model and the scene"
+        )
+    elif not test.is_white:
+        yield (
+            f"the residuals are not white (Ljung-Box, p {probability(test.p)}); intervals are "
+            f"widened by up to a factor of {factor}; check what the scene leaves out"
         )
     if solution.may_be_flipped:
         yield opposite_sign(result.target.model, DELAY in solution.problem.parameters.keys)
@@ -71,18 +84,6 @@ def _of_solution(result: Fit) -> Iterator[str]:
         yield (
             f"{missed} of {count} starts ended at a larger misfit, so a better solution may exist; "
             "give more --starts"
-        )
-    if solution.problem.data.is_known and solution.scale >= MISFIT:
-        yield (
-            f"chi squared is {significant(solution.scale)} times its degrees of freedom: the "
-            "residual exceeds the errors of the measurement; intervals, widened by a factor of "
-            f"{significant(np.sqrt(solution.scale), 2)}, are not valid 95 % intervals"
-        )
-    if not test.is_white:
-        factor = max(result.intervals.widenings.tolist(), default=1.0)
-        yield (
-            f"the residuals are not white (Ljung-Box, p {probability(test.p)}); intervals are "
-            f"widened by up to a factor of {significant(factor)}; check what the scene leaves out"
         )
     if (share := sum(line.share for line in strong)) > LEAST_SHARE:
         yield (
@@ -108,8 +109,15 @@ def _of_estimates(result: Fit) -> Iterator[str]:
                 f"{limits.low:g} to {limits.high:g}, and intervals are not valid; widen the range, "
                 "or check the scene"
             )
-        elif not each.is_resolved and each.key not in named:
-            yield _undetermined_keys(each.key)
+        elif not each.is_resolved and each.key not in named and result.intervals.is_described:
+            yield (
+                _undetermined_keys(each.key)
+                if not result.intervals.unexplained
+                else (
+                    f"with this misfit {each.key} may have any value between its limits; check the "
+                    "model and the scene"
+                )
+            )
         if each.is_curved and not each.at_limit:
             yield (
                 f"the interval of {each.key} is approximate, because the model is not linear over "
@@ -135,8 +143,8 @@ def notes(result: Fit) -> list[str]:
     ]  # fmt: skip
     for each in result.estimates:
         if "." in each.key and (each.at_limit or not each.is_resolved):
-            reason = "at a limit" if each.is_resolved else "not resolved"
-            sentences.append(f"{each.key} is {reason}: its spread is its whole range")
+            reason = "is at a limit" if each.at_limit else "has no interval"
+            sentences.append(f"{each.key} {reason}: its spread is its whole range")
     sentences += [f"{key} is tied and has no spread" for key in parameters.ties if "." in key]
     is_part = np.array(["." in key for key in parameters.keys])
     correlations = np.nan_to_num(result.intervals.correlations)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from math import expm1, sqrt
 from typing import Any
 
-import numpy as np
 from scipy.special import ndtri
 
 from simple_model.choices import choose
@@ -74,8 +73,7 @@ class Fit:
     @property
     def misfit(self) -> float:
         """Relative L2 norm of the unweighted residual."""
-        values = self.solution.problem.data.values
-        return float(np.linalg.norm(self.prediction - values) / np.linalg.norm(values))
+        return self.intervals.misfit
 
 
 def fit(

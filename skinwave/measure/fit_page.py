@@ -39,7 +39,7 @@ DRAWN_TIME = 0.05  # s of waveforms
 NORMAL_95 = 1.96
 ABOUT_INTERVALS = (
     "A 95 % interval contains the true value in 95 of 100 measurements, if the model is correct "
-    "and the residuals are noise."
+    "and the residuals are noise. A misfit beyond the noise widens it, as a systematic error."
 )
 ABOUT_WAVEFORMS = "Grey: measured; blue: fitted; orange: measured minus fitted."
 ABOUT_LINES = (
@@ -110,7 +110,8 @@ def _whiteness(result: Fit) -> str:
     text = f"Ljung-Box test: p {probability(test.p)}"
     if test.is_white:
         return f"{text}. The residuals may be white noise."
-    return f"{text}. The residuals are not white, so the intervals are widened (White 1980)."
+    widened = ", so the intervals are widened (White 1980)" * result.intervals.is_described
+    return f"{text}. The residuals are not white{widened}."
 
 
 def estimate_table(result: Fit) -> Table:
@@ -130,7 +131,8 @@ def _interval_table(result: Fit) -> Table:
     rows = []
     free = result.solution.problem.parameters.free
     for each, limits in zip(result.estimates, free, strict=True):
-        value, interval = significant(each.value), "not resolved by the data"
+        value = significant(each.value)
+        interval = "not resolved by the data" if result.intervals.is_described else "-"
         if each.is_resolved:
             value, low, high = round_to_interval(each)
             interval = f"{low} to {high}"
@@ -153,6 +155,7 @@ def summary(result: Fit) -> dict[str, Any]:
         "chi_squared": solution.cost,
         "degrees_of_freedom": solution.dof,
         "misfit": result.misfit,
+        "misfit_beyond_noise": result.intervals.unexplained,
         "whiteness_p": _finite(result.intervals.whiteness.p),
         "widened": dict(zip(keys, result.intervals.widenings.tolist(), strict=True)),
         "left_out": [

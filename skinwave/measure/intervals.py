@@ -8,14 +8,17 @@ the data do not resolve it (Transtrum, Machta and Sethna, Phys Rev E 83:036701 (
 If residuals are not white, intervals are widened. An estimate moves by d = P e with the errors e, P
 the pseudo-inverse of the slopes; for stationary e, the variance of d is a sandwich covariance, as
 in `lines`, with the periodogram of the residuals, smoothed over the root of their number (Daniell).
+A residual beyond the noise is systematic and widens them as in `misfit`. If it exceeds a share of
+the motion, no estimate has an interval.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import chi2, t
 
+from skinwave.measure.misfit import LARGEST_MISFIT, beyond_noise, systematic, unexplained
 from skinwave.measure.search import Solution
 from skinwave.typing import Floats
 
@@ -31,7 +34,9 @@ CURVED = 0.3  # relative difference of the root of chi squared from that of a li
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """Estimate of a parameter with its 95 % interval, nan if the data do not resolve it."""
+    """Estimate of a parameter with its 95 % interval, nan if the data do not resolve it or the
+    model does not describe them.
+    """
 
     key: str
     value: float
@@ -67,18 +72,25 @@ class Intervals:
 
     estimates: tuple[Estimate, ...]  # one per parameter
     half: Floats  # (k,), half widths in the unit cube
-    widenings: Floats  # (k,), factors in these for residuals that are not white
+    widenings: Floats  # (k,), factors in these for residuals that are not white, or not noise
     correlations: Floats  # (k, k) of the estimates; nan for unresolved ones
     unresolved: tuple[tuple[str, ...], ...]  # keys of unresolved directions, the worst first
     whiteness: Whiteness
+    misfit: float  # relative L2 norm of the unweighted residual
+    unexplained: float  # the part of it beyond the noise
+
+    @property
+    def is_described(self) -> bool:
+        """Whether the model describes the record well enough for intervals."""
+        return self.unexplained <= LARGEST_MISFIT
 
 
 def intervals(solution: Solution) -> Intervals:
     """Return the intervals of a solution; they are symmetric in logarithms where these vary."""
     scale, shape = max(solution.scale, 1e-300), solution.residual.shape
-    left, singular, vt = np.linalg.svd(solution.slopes / np.sqrt(scale), full_matrices=False)
+    back, singular, vt = np.linalg.svd(solution.slopes / np.sqrt(scale), full_matrices=False)
     singular = np.maximum(singular, ROUND_OFF * max(float(singular.max()), 1e-300))
-    moves = (vt.T / singular) @ left.T  # of the parameters by each error
+    moves = (vt.T / singular) @ back.T  # of the parameters by each error
     covariance = moves @ moves.T
     error = np.sqrt(np.diag(covariance))
     test = whiteness(solution.residual)
@@ -87,25 +99,47 @@ def intervals(solution: Solution) -> Intervals:
     widenings, across = np.ones(len(moves)), np.ones(len(moves))
     if not test.is_white:
         widenings, across = (
-            widening(solution.residual, rows.reshape(-1, *shape)) for rows in (moves, left.T)
+            widening(solution.residual, rows.reshape(-1, *shape)) for rows in (moves, back.T)
         )
+    beyond, misfit = _beyond_noise(solution, test), _misfit(solution)
+    widenings = np.hypot(widenings, systematic(beyond / scale) / width)
     half = width * widenings * error
     hidden = half >= UNRESOLVED
     correlations = covariance / np.outer(error, error)
     directions = np.abs(vt[singular < 2 * width * across][::-1])
     keys = solution.problem.parameters.keys
-    return Intervals(
+    found = Intervals(
         estimates=tuple(
             _estimate(solution, k, half[k] * covariance[k] / covariance[k, k], width * widenings[k])
             for k in range(len(half))
         ),
-        half=half, widenings=widenings, whiteness=test,
+        half=half, widenings=widenings, whiteness=test, misfit=misfit,
+        unexplained=unexplained(misfit, beyond, solution.cost),
         correlations=np.where(hidden[:, None] | hidden, np.nan, correlations),
         unresolved=tuple(
             tuple(keys[k] for k in np.flatnonzero(parts > MEMBER * parts.max()))
             for parts in directions
         ),
     )  # fmt: skip
+    if found.is_described:
+        return found
+    bare = (replace(e, low=np.nan, high=np.nan, is_curved=False) for e in found.estimates)
+    none = np.full_like(correlations, np.nan)
+    return replace(found, estimates=tuple(bare), correlations=none, unresolved=())
+
+
+def _beyond_noise(solution: Solution, test: Whiteness) -> float:
+    """Return chi squared beyond the noise, whose correlated values count as fewer (Bayley and
+    Hammersley, J R Stat Soc 8:184 (1946)).
+    """
+    shared, freedom = 1 + 2 * float((test.correlations**2).sum()), solution.problem.data.freedom
+    return shared * beyond_noise(solution.cost / shared, solution.dof / shared, freedom)
+
+
+def _misfit(solution: Solution) -> float:
+    values = solution.problem.data.values
+    away = solution.problem.predict(solution.u) - values
+    return float(np.linalg.norm(away)) / max(float(np.linalg.norm(values)), 1e-300)
 
 
 def _estimate(solution: Solution, k: int, to_end: Floats, away: float) -> Estimate:

@@ -89,6 +89,8 @@ class Data:
     whitening: Floats | None = None
     lines: tuple[str, ...] = ()  # fitted lines
     left_out: tuple[LeftOutLine, ...] = ()  # lines of the load that are not fitted
+    freedom: float = np.inf  # degrees of freedom of the errors; 0 if noise and misfit are not told
+    # apart
     rough: "Data | None" = None  # cheaper data of the same record, for the search
 
     @property
@@ -181,6 +183,7 @@ def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
         values=_parts(a), error=np.tile(lines.error, 2), is_known=lines.is_known,
         predict=lambda values: _parts(predict(values)), lines=lines.names, left_out=lines.left_out,
         whitening=None if correlation is None else _whitening(correlation[None]),
+        freedom=float(np.min(amplitudes.freedom)) if lines.is_known else 0.0,
     )  # fmt: skip
     if kind == "lines":
         return data

@@ -53,7 +53,9 @@ Scenes = Mapping[str, Mapping[str, Scene]]  # Tacton -> column -> scene
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOutcome:
-    """Outcome of a comparison: number of finished and of `planned` runs."""
+    """Outcome of a comparison: number of finished and of `planned` runs, and conclusions on the
+    agreement with a measurement.
+    """
 
     assessed_claims: list[AssessedClaim]
     warnings: list[str]
@@ -61,6 +63,7 @@ class StudyOutcome:
     planned: int
     seconds: float
     peak_memory: int
+    conclusions: list[str]
 
 
 def paper_scenes(bodies: Mapping[str, Body] | None = None) -> Scenes:
@@ -133,6 +136,7 @@ def run_study(
                 first = first_screen(groups, lambda run: _maps(run, maps, progress))
     parts: list[document.Part] = [*more]
     figures: dict[str, Sequence[Run]] = dict(groups)
+    conclusions: list[str] = []
     for name, group in groups.items() if measured else ():
         from skinwave.measure import comparison_page  # slow to import
 
@@ -141,6 +145,7 @@ def run_study(
         comparison = compare_measured(
             measured, [in_quantity(run, quantity, prepared) for run in group]
         )
+        conclusions += [comparison_page.conclusion(comparison, c) for c in comparison.bodies]
         comparison_page.write_tables(folder, comparison)
         parts.append(comparison_page.page_section(comparison, Gallery().figure))
         figures[name] = runs_to_draw(comparison)
@@ -155,6 +160,7 @@ def run_study(
     return StudyOutcome(
         assessed_claims=assessed_claims, warnings=document.worst_warnings(efforts_of(runs)),
         runs=len(runs), planned=planned, seconds=time.perf_counter() - started,
+        conclusions=conclusions,
         peak_memory=max(peak_memory(), *(run.response.effort.peak_memory for run in runs)),
     )  # fmt: skip
 

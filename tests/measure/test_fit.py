@@ -15,7 +15,8 @@ from skinwave.commands import cli
 from skinwave.measure import Measurement
 from skinwave.measure.findings import cautions
 from skinwave.measure.fit import fit
-from skinwave.measure.fit_page import fitted_scene
+from skinwave.measure.fit_page import fitted_scene, summary
+from skinwave.measure.misfit import NOT_DESCRIBED
 from skinwave.measure.observed import is_steady, load_lines
 from skinwave.measure.parameters import check_limits, parse
 from skinwave.measure.predicted import predicted_lines, target
@@ -125,9 +126,34 @@ def test_an_estimate_at_a_limit_and_a_misfit_give_warnings(scene, lines):
     vary_low = [f"{MODULUS}=10000:20000", *vary("gain")]
     warnings = cautions(fit(scene, spectra(scene, lines, delay=0), vary_low, starts=1))
     assert any(text.startswith(f"{MODULUS} = ") and "limit" in text for text in warnings)
-    assert any(text.startswith("chi squared") for text in warnings)
+    assert any(text.startswith("poor fit") for text in warnings)
     turned = fit(scene, spectra(scene, lines, gain=-0.8), vary(MODULUS, "gain"), starts=1)
     assert any("sign" in text for text in cautions(turned))
+
+
+def test_a_fit_of_a_wrong_law_has_wide_intervals_or_none(scene, lines):
+    law = loads(TEXT.replace("[probes]", """[body.material]
+density_kg_m3 = 1000
+poisson = 0.4999
+shear_modulus_pa = 20e3
+loss_factor = 0.2
+[probes]"""))  # fmt: skip
+    varied = [*vary(MODULUS, "gain", "delay_ms"), "body.material.loss_factor=0.02:2"]
+    measured = spectra(scene, lines, 1e-4)
+    wide, none = (fit(law, measured, each, starts=1) for each in (varied, vary(MODULUS, "gain")))
+    of = {each.key: each for each in wide.estimates}
+    assert of["gain"].low < 0.8 < of["gain"].high
+    assert of["delay_ms"].low < 0.7 < of["delay_ms"].high
+    assert any(text.startswith("the misfit beyond the noise") for text in cautions(wide))
+    assert none.misfit > 0.2
+    found = summary(none)
+    assert not any(each["resolved"] or each["low"] for each in found["estimates"])
+    assert NOT_DESCRIBED[1:] in found["sentences"][2]
+    assert NOT_DESCRIBED in found["warnings"][0]
+    assert "95 %" not in " ".join(found["sentences"])
+    assert {each.distribution.shape for each in spreads_of(none.scene) if each.key == MODULUS} == {
+        "uniform"
+    }
 
 
 def test_amplitudes_need_no_delay(scene, lines):

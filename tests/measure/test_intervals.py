@@ -1,5 +1,6 @@
 """Searches and intervals of fits: closed forms of linear fits, plane waves, and coloured noise."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -70,6 +71,27 @@ def test_an_interval_over_which_the_model_bends_is_approximate():
     (estimate,) = intervals(solve(asked, 2, 0, silent)).estimates
     assert [estimate.low, estimate.high] == pytest.approx([0.02, 0.18], abs=0.005)
     assert estimate.is_curved
+
+
+@pytest.mark.parametrize(("given", "freedom"), [(1e-4, np.inf), (1.0, 0.0)])
+def test_a_misfit_counts_as_one_complex_error(given, freedom):
+    """Of a share m of the motion: half an interval of m t / sqrt(2), t with 2 degrees of freedom,
+    however many values it has, and none if m is above a fifth.
+    """
+    for n, m in ((50, 0.1), (2000, 0.1), (50, 0.3)):
+        shape, wrong = np.linalg.qr(np.random.default_rng(n).standard_normal((n, 2)))[0].T
+        asked = problem_of(
+            shape + m * wrong, lambda v, of=shape: v["gain"] * of, given, ["gain=0.1:10"],
+            is_known=given < 1,
+        )  # fmt: skip
+        asked = replace(asked, data=replace(asked.data, freedom=freedom))
+        found = intervals(solve(asked, 1, 0, silent))
+        (estimate,) = found.estimates
+        assert found.unexplained == pytest.approx(m / np.hypot(1, m), rel=0.01)
+        assert found.is_described == estimate.is_resolved == (m < 0.2)
+        if m < 0.2:
+            half = m * 4.3027 / np.sqrt(2)
+            assert np.log(estimate.high / estimate.low) / 2 == pytest.approx(half, rel=0.02)
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():

@@ -17,6 +17,7 @@ from skinwave.measure import comparison_page as measured_page
 from skinwave.measure.claims import FAILS, HOLDS, UNDECIDED, assess_measured, by_name
 from skinwave.measure.comparison import Measured, at_measured_places, compare_measured, runs_to_draw
 from skinwave.measure.lines import MeasuredLines
+from skinwave.measure.misfit import NOT_DESCRIBED
 from skinwave.measure.writing import write
 from skinwave.planning.simulate import compute
 from skinwave.report.maps import MeasuredPlaces, surfaces_figure
@@ -94,11 +95,28 @@ def test_a_model_three_tenths_too_stiff_is_rejected(models):
     found = compare_measured(measured, models[False])
     column = found.main
     assert column.differs[list(found.names).index("f_AM")].sum() >= 3
-    assert column.misfit > 3 * found.noise
+    assert column.alignment.misfit > 3 * found.noise
     assert (found.findings(column) == comparison.DIFFERS).any()
     same = compare_measured(measured, models[True])
-    assert same.main.misfit < column.misfit / 3
+    assert same.main.alignment.misfit < column.alignment.misfit / 3
     assert {*np.unique(same.findings(same.main))} == {comparison.AGREES, comparison.NO_LINE}
+
+
+def test_errors_of_gain_and_delay_hold_the_truth_of_a_wrong_model_or_are_not_given(models):
+    measured = Measured(measurement=record(models[True][-1], np.random.default_rng(2), sigma=2e-5))
+    found = compare_measured(measured, models[False])
+    a = found.main.alignment
+    assert 0.05 < a.unexplained < 0.2
+    assert abs(a.gain - GAIN) < 1.96 * a.gain_error < GAIN
+    off = (a.delay - (DELAY - 0.007) + 1 / 280) % (1 / 140) - 1 / 280
+    assert abs(off) < 1.96 * a.delay_error < 1 / 280
+    assert "include the misfit" in measured_page.conclusion(found, found.main)
+    far = compare_measured(measured, runs_of(AM, stiffness=4.0))
+    assert far.main.alignment.misfit > 0.2
+    assert np.isnan([far.main.alignment.gain_error, far.main.alignment.delay_error]).all()
+    assert NOT_DESCRIBED[1:] in measured_page.conclusion(far, far.main)
+    (*_, row) = json.loads(measured_page.columns_table(far).to_json())
+    assert not any("±" in str(cell) or "given" in str(cell) for cell in row.values())
 
 
 def test_a_model_that_misfits_has_a_delay_at_which_the_record_lies_within_the_tacton():
@@ -110,7 +128,7 @@ def test_a_model_that_misfits_has_a_delay_at_which_the_record_lies_within_the_ta
     measured = Measurement(quantity="velocity", places=scene.probe_points, **given)
     found = compare_measured(Measured(measurement=measured), [stiff])
     column = found.main
-    assert column.misfit > 0.2
+    assert column.alignment.misfit > 0.2
     assert abs(column.alignment.delay) < 1e-3
     assert not any("--delay" in text for text in measured_page.remarks(found))
     far = compare_measured(Measured(measurement=measured, delay=-0.3926), [stiff])
@@ -131,7 +149,7 @@ def test_delay_and_gain_are_those_given(models):
     found = compare_measured(asked, models[True])
     *kernels, body = found.columns
     assert (body.alignment.gain, body.alignment.delay) == (GAIN, DELAY - 0.007)
-    assert all(k.alignment.gain != GAIN and k.alignment.gain_error > 0 for k in kernels)
+    assert all(k.alignment.gain != GAIN and k.alignment.gain_error != 0 for k in kernels)
     assert not body.differs.any()
     late = compare_measured(replace(asked, delay=0.0), models[True])
     assert late.main.differs.any()
@@ -185,7 +203,7 @@ def test_a_spectrum_of_lines_is_compared_and_drawn(models):
     assert list(found.names) == ["f_AM", "2f_AM"]
     assert "3f_AM" in found.unresolved
     assert (found.findings(found.main) == comparison.UNKNOWN).all()
-    assert found.main.misfit < 1e-4
+    assert found.main.alignment.misfit < 1e-4
     drawn = runs_to_draw(found)[-1].response
     size = np.ptp(run.response.values, axis=0)
     model = GAIN * (run.response.values - run.response.values.mean(axis=0))

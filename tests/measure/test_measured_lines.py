@@ -96,6 +96,16 @@ def test_delay_and_gain_can_be_given():
         align(lines, 0 * MODEL)
 
 
+def test_without_known_noise_errors_are_from_the_misfit():
+    each = GAIN * MODEL[None] + 0.01 * complex_noise(np.random.default_rng(0), 1, *MODEL.shape)
+    lines = replace(only(each, np.full(MODEL.shape, np.nan)), freedom=1.0)
+    found = align(lines, MODEL)
+    assert found.gain_error == pytest.approx(found.misfit * GAIN * 4.3027 / 1.96 / 2**0.5, rel=0.1)
+    assert 0 < found.delay_error < 1e-3
+    one = replace(lines.only(np.array([0])), each=each[:, :1, :1], variance=lines.variance[:1, :1])
+    assert np.isnan(align(one, MODEL[:1, :1]).gain_error)
+
+
 def test_repetitions_out_of_step_are_shifted_into_it():
     rng = np.random.default_rng(3)
     late = np.array([0.0, 0.4e-3, -0.7e-3, 1.1e-3, 0.1e-3])

@@ -1,0 +1,37 @@
+"""Misfit of a model beyond the noise, and the error that it leaves in estimates.
+
+The residual of a wrong model is systematic: more samples, lines and places do not make it more
+independent. It counts as one complex value, whose two real parts estimate a variance as large along
+the slopes of the parameters as across them, with two degrees of freedom.
+"""
+
+from math import sqrt
+
+import numpy as np
+from scipy.special import stdtrit
+from scipy.stats import f as fisher
+
+LARGEST_MISFIT = 0.2  # of the motion, beyond the noise, with which a model describes a record
+NOT_DESCRIBED = "the model does not describe this record"
+CHANCE = 1e-3  # that noise alone leaves a misfit
+
+
+def beyond_noise(chi_squared: float, dof: float, freedom: float = np.inf) -> float:
+    """Return the part of chi squared above its largest value from noise alone.
+
+    `freedom` are the degrees of freedom of the errors; 0 for unknown ones, whose residual is taken
+    as misfit.
+    """
+    if not freedom > 0:
+        return chi_squared
+    return max(chi_squared - dof * float(fisher.isf(CHANCE, dof, min(freedom, 1e6))), 0.0)
+
+
+def systematic(beyond: float) -> float:
+    """Return half the 95 % interval, along a slope of length 1, from chi squared beyond noise."""
+    return float(stdtrit(2, 0.975)) * sqrt(beyond / 2)
+
+
+def unexplained(misfit: float, beyond: float, chi_squared: float) -> float:
+    """Return the part of a misfit that noise does not explain."""
+    return misfit * sqrt(beyond / chi_squared) if beyond > 0 else 0.0
