@@ -1,11 +1,15 @@
 """Warnings of a response that differs from the request, apart from its expected error."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from simple_model import Response
-from simple_model.load.line_names import line_names
+from simple_model import MovingPressure, Response, resolved_lines
+from simple_model.load.line_names import FEWEST_CYCLES, line_names, named_lines
 from simple_model.load.sampling import step
-from simple_model.numbers import EN_DASH, significant
+from simple_model.load.tacton import LONGEST, exact_period
+from simple_model.numbers import EN_DASH, plural, significant
+from simple_model.response import LINE_BINS, SETTLE
 from skinwave.models import named
 from skinwave.models.limits import cures_for, in_words
 from skinwave.models.relative_change import change_text
@@ -31,6 +35,7 @@ def response_warnings(
         *larger_error(scene, response, predicted, tolerance),
         *stretching(scene, response, tolerance),
         *lines_left_out(scene, response),
+        *rhythm_unresolved(scene, response),
         *implausible(scene),
     )
 
@@ -81,6 +86,41 @@ def lines_left_out(scene: Scene, response: Response) -> tuple[str, ...]:
         f"{lines.names[strongest]} at {lines.frequencies[strongest]:.4g} Hz{others}; use a time "
         f"step below {500 / lines.frequencies[above].max():.2g} ms",
     )
+
+
+def rhythm_unresolved(scene: Scene, response: Response) -> tuple[str, ...]:
+    """Warn of strong lines of a rhythm that the response is too short to resolve."""
+    tacton, rhythm, dt = scene.tacton, scene.tacton.rhythm, step(response.times)
+    seconds = dt * len(response.times)
+    lost = rhythm is not None and _count_unresolved(scene.pressure, seconds, dt)
+    if not (rhythm and lost):
+        return ()
+    many = LINE_BINS / (1 - SETTLE) * rhythm.period * 2.0 ** np.arange(8)
+    enough = (
+        longer for longer in sorted([FEWEST_CYCLES * exact_period(tacton), *many])
+        if tacton.duration < longer <= LONGEST and not _count_unresolved(
+            replace(scene.pressure, tacton=replace(tacton, duration=longer)), longer, dt
+        )
+    )  # fmt: skip
+    cure = next((f"set duration_s to {np.ceil(1e3 * t) / 1e3:g}" for t in enough), "")
+    return (
+        f"{plural(lost, 'line')} of the rhythm, whose period is {rhythm.period:g} s, cannot be "
+        f"resolved in {seconds:.3g} s; {cure or 'use a shorter rhythm'}",
+    )
+
+
+def _count_unresolved(pressure: MovingPressure, seconds: float, dt: float) -> int:
+    """Return the number of strong lines that a response of some seconds does not resolve, or 1 if a
+    rhythm does not repeat often enough to make lines.
+    """
+    strong, rhythm = named_lines(pressure, WEAK_LINE_RATIO), pressure.tacton.rhythm
+    if rhythm and not strong:
+        return int(seconds < FEWEST_CYCLES * rhythm.period)
+    times = dt * np.arange(round(seconds / dt))
+    still = Response(
+        model="", times=times, probes=np.zeros((1, 2)), values=np.zeros((len(times), 1))
+    )
+    return len(strong.keys() & resolved_lines(pressure, still)[1])
 
 
 def implausible(scene: Scene) -> tuple[str, ...]:
