@@ -102,10 +102,17 @@ def rhythm_unresolved(scene: Scene, response: Response) -> tuple[str, ...]:
             replace(scene.pressure, tacton=replace(tacton, duration=longer)), longer, dt
         )
     )  # fmt: skip
-    cure = next((f"set duration_s to {np.ceil(1e3 * t) / 1e3:g}" for t in enough), "")
+    longer = next(enough, 0.0)
+    duration = np.ceil(1e3 * (longer or FEWEST_CYCLES * rhythm.period) - 1e-6) / 1e3
+    cure = f"set duration_s to {duration:g}"
+    if not longer:
+        cure = (
+            f"use frequencies that are multiples of {1 / rhythm.period:.6g} Hz, and duration_s = "
+            f"{duration:g} or more"
+        )
     return (
         f"{plural(lost, 'line')} of the rhythm, whose period is {rhythm.period:g} s, cannot be "
-        f"resolved in {seconds:.3g} s; {cure or 'use a shorter rhythm'}",
+        f"resolved in {seconds:.3g} s; {cure}",
     )
 
 
