@@ -123,7 +123,7 @@ def _count_unresolved(pressure: MovingPressure, seconds: float, dt: float) -> in
     strong, rhythm = named_lines(pressure, WEAK_LINE_RATIO), pressure.tacton.rhythm
     if rhythm and not strong:
         return int(seconds < FEWEST_CYCLES * rhythm.period)
-    times = dt * np.arange(round(seconds / dt))
+    times = np.linspace(0.0, seconds, round(seconds / dt), endpoint=False)
     still = Response(
         model="", times=times, probes=np.zeros((1, 2)), values=np.zeros((len(times), 1))
     )

@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 
 from fem import NotReduced
 from simple_model import Effort, MovingPressure, Response, lines, resolved_lines, sensation_level
+from simple_model.line_table import lines_in_pulses
 from simple_model.load.drive import usual_drive
 from simple_model.numbers import decibel, share_of, significant
 from skinwave.bodies.sizes import default_size
@@ -294,11 +295,13 @@ def _changes(reference: Response, candidate: Response) -> tuple[Floats, float]:
 
 def _level(scene: Scene, response: Response) -> float:
     """Return the highest sensation level in dB of a line at any probe, or minus infinity."""
-    if not (names := compared_lines(scene, response)):
-        return -np.inf
-    f = np.array([*names.values()])
-    unit = "m" if response.record.of_body else "Pa"
-    return float(sensation_level(lines(response, f), f[:, None], unit=unit).max())
+    unit, pressure = "m" if response.record.of_body else "Pa", _with_usual_drive(scene.pressure)
+    table = lines_in_pulses(pressure, response, candidates=ASSESSED)
+    levels = [
+        sensation_level(table.amplitudes[name], f, unit=unit).max()
+        for name, f in table.frequencies.items() if f < HIGHEST
+    ]  # fmt: skip
+    return float(max(levels, default=-np.inf))
 
 
 def compared_lines(scene: Scene, response: Response) -> dict[str, float]:
@@ -306,9 +309,12 @@ def compared_lines(scene: Scene, response: Response) -> dict[str, float]:
 
     These are the lines of a nonlinear drive, which include all lines of a linear one.
     """
-    drive = usual_drive(scene.pressure.drive, MovingPressure.drive)
-    pressure = replace(scene.pressure, drive=drive)
+    pressure = _with_usual_drive(scene.pressure)
     return resolved_lines(pressure, response, candidates=ASSESSED, highest=HIGHEST)[0]
+
+
+def _with_usual_drive(pressure: MovingPressure) -> MovingPressure:
+    return replace(pressure, drive=usual_drive(pressure.drive, MovingPressure.drive))
 
 
 def line_changes(
