@@ -237,8 +237,9 @@ def test_levels_and_reach_are_those_while_a_pulse_is_on():
         found.append((highest.name, row["sensation_line"], effect.above_threshold, levels))
     assert found[0][:3] == found[1][:3]
     assert found[0][2][1].metre > 0
-    np.testing.assert_allclose(found[0][3], found[1][3], atol=0.1)
-    np.testing.assert_allclose(found[0][3], found[0][3][0], atol=0.1)
+    # The body settles in some milliseconds of 160: 0.14 dB.
+    np.testing.assert_allclose(found[0][3], found[1][3], atol=0.2)
+    np.testing.assert_allclose(found[0][3], found[0][3][0], atol=1e-6)
 
 
 def test_a_rhythm_alone_has_the_level_of_its_lines():
