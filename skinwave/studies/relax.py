@@ -25,8 +25,10 @@ from simple_model import Effort, MovingPressure, Response, lines, resolved_lines
 from simple_model.line_table import lines_in_pulses
 from simple_model.load.drive import usual_drive
 from simple_model.numbers import decibel, share_of, significant
+from simple_model.point_kernel import published_load
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
+from skinwave.models.point_kernel import PUBLISHED
 from skinwave.planning.assessment import all_warnings
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import png
@@ -295,8 +297,9 @@ def _changes(reference: Response, candidate: Response) -> tuple[Floats, float]:
 
 def _level(scene: Scene, response: Response) -> float:
     """Return the highest sensation level in dB of a line at any probe, or minus infinity."""
-    unit, pressure = "m" if response.record.of_body else "Pa", _with_usual_drive(scene.pressure)
-    table = lines_in_pulses(pressure, response, candidates=ASSESSED)
+    unit, pressure = "m" if response.record.of_body else "Pa", scene.pressure
+    acting = published_load(pressure) if response.model == PUBLISHED.name else pressure
+    table = lines_in_pulses(acting, response, candidates=ASSESSED)
     levels = [
         sensation_level(table.amplitudes[name], f, unit=unit).max()
         for name, f in table.frequencies.items() if f < HIGHEST
@@ -309,12 +312,9 @@ def compared_lines(scene: Scene, response: Response) -> dict[str, float]:
 
     These are the lines of a nonlinear drive, which include all lines of a linear one.
     """
-    pressure = _with_usual_drive(scene.pressure)
+    drive = usual_drive(scene.pressure.drive, MovingPressure.drive)
+    pressure = replace(scene.pressure, drive=drive)
     return resolved_lines(pressure, response, candidates=ASSESSED, highest=HIGHEST)[0]
-
-
-def _with_usual_drive(pressure: MovingPressure) -> MovingPressure:
-    return replace(pressure, drive=usual_drive(pressure.drive, MovingPressure.drive))
 
 
 def line_changes(
