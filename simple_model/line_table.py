@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simple_model.load.line_names import SAME_LINE, WEAKEST, LineNames, line_names
+from simple_model.load.line_names import (
+    SAME_LINE,
+    WEAKEST,
+    LineNames,
+    during_pulses,
+    line_names,
+)
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
+from simple_model.load.spectrum import load_lines
+from simple_model.point_kernel import point_kernel
 from simple_model.response import (
     ALIKE,
     SETTLE,
@@ -18,6 +26,7 @@ from simple_model.response import (
     fit_lines,
     is_masked,
     is_separate,
+    phasors,
     resolution,
     windowed_amplitude,
 )
@@ -33,6 +42,7 @@ MOST_PEAKS = 50
 WINDOW, LOBE = "blackmanharris", 4  # bins to the first zero
 DECAYED = 0.9  # second half over first: below it a peak is a free vibration
 FREE, UNRESOLVED, UNNAMED = "free vibration", "unresolved", "unnamed"
+OF_LOAD = "of the load, unnamed"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,9 +50,10 @@ class Unnamed:
     """A peak that is not a single line of the load: `frequency` in Hz, `amplitudes` (p,), and
     `kind`.
 
-    Kinds are "free vibration" of a body after its start, which decays; "unresolved" lines of the
-    load, too close to each other for a short response; and "unnamed" for any other peak, such as a
-    harmonic of a nonlinear body.
+    Kinds are "free vibration" of a body after its start, which decays and is not in the load;
+    "unresolved" lines of the load, too close to each other for a short response; "of the load,
+    unnamed" for lines without a name, such as those of a chirp; and "unnamed" for any other peak,
+    such as a harmonic of a nonlinear body.
     """
 
     frequency: float
@@ -99,21 +110,51 @@ def line_table(
     >>> {name: round(float(a[0]), 3) for name, a in table.amplitudes.items()}  # Pa
     {'f_AM': 25.0, '2f_AM': 6.25}
     """
+    response = replace(response, load=pressure)
     nyquist = 0.5 / step(response.times)
     named = line_names(pressure, FITTED, candidates=candidates)
     same = SAME_LINE / pressure.tacton.duration
     named = named.with_more(_apart(other_lines or {}, named, same))
     named = named.some(named.frequencies < nyquist)
     fit = _fit(named, response)
-    peaks = _peaks(response, fit)
+    peaks = _peaks(pressure, response, fit)
     steady = [peak.frequency for peak in peaks if peak.kind != FREE]
     if steady:  # lines that are weak in the load may be strong in a response
         weak = line_names(pressure, FAINTEST, most=10**6)
         weak = weak.some(weak.frequencies < nyquist)
         named = _with_weak(named, weak, steady, resolution(response))
         fit = _fit(named, response)
-        peaks = _peaks(response, fit)
+        peaks = _peaks(pressure, response, fit)
     return _table(named, fit, peaks, response)
+
+
+def lines_in_pulses(
+    pressure: MovingPressure, response: Response, *, candidates: Iterable[str] = ()
+) -> LineTable:
+    """List the lines of a response while a pulse of the load's rhythm is on.
+
+    They are the lines in the steady state under the same load without its rhythm, as in a pulse
+    that lasts. Each amplitude is the transform of the response times the line of the steady load
+    over the transform of the load. This is exact if the focus rests and the body settles within the
+    response. Without a rhythm the result is `line_table`.
+    """
+    steady = during_pulses(pressure)
+    if steady == pressure:
+        return line_table(pressure, response, candidates=candidates)
+    known, lost = resolved_lines(steady, response, candidates=candidates)
+    tacton, f = pressure.tacton, np.array([*known.values()])
+    on_path = tacton.trajectory.at_phase(np.mod([*tacton.foci, *np.arange(8) / 8], 1.0))
+    pulsed, lasting = (point_kernel(x, on_path, response.times) for x in (pressure, steady))
+    line = np.linalg.norm(phasors(lasting, f), axis=1)
+    window = cosines("hann", len(response.times))
+    wave = 2 / window.sum() * window * np.exp(-2j * np.pi * f[:, None] * response.times)
+    transform = np.linalg.norm(wave @ pulsed.values, axis=1)
+    factor = np.where(line > FAINTEST * line.max(initial=0.0), line / transform, 0.0)
+    amplitudes = factor[:, None] * np.abs(wave @ response.values)
+    return LineTable(
+        frequencies=known, amplitudes=dict(zip(known, amplitudes, strict=True)), unresolved=lost,
+        unnamed=(),
+    )  # fmt: skip
 
 
 def resolved_lines(
@@ -136,6 +177,7 @@ def resolved_lines(
     -------
     frequencies in Hz by name: of the resolved lines, and of the unresolved ones
     """
+    response = replace(response, load=pressure)
     highest = min(highest, 0.5 / step(response.times))
     named = line_names(pressure, candidates=candidates)
     named = named.some(named.frequencies < highest)
@@ -181,7 +223,7 @@ def _fit(named: LineNames, response: Response) -> _Fit:
     return _Fit(resolved=resolved, fitted=fitted, amplitudes=amplitudes, rest=rest)
 
 
-def _peaks(response: Response, fit: _Fit) -> list[Unnamed]:
+def _peaks(pressure: MovingPressure, response: Response, fit: _Fit) -> list[Unnamed]:
     """Peaks in the spectrum of the whole response minus the fitted lines."""
     dt, begun = step(response.times), round(SETTLE * len(fit.rest))
     amplitude = windowed_amplitude(fit.rest, WINDOW)
@@ -195,12 +237,15 @@ def _peaks(response: Response, fit: _Fit) -> list[Unnamed]:
     for k in tops[np.argsort(-of_any[tops], kind="stable")].tolist():
         if k >= LOBE and all(abs(k - other) > LOBE for other in chosen):
             chosen.append(k)
+    known = chosen and type(pressure) is MovingPressure  # the lines of a subclass are unknown
+    driven = load_lines(pressure).frequencies if known else np.empty(0)
     peaks = []
     for k in chosen[:MOST_PEAKS]:
         bins = k + _offset(amplitude[k - 1 : k + 2, int(np.argmax(level[k]))])
         turns = bins / len(fit.rest)
+        of_load = _near(np.array([turns / dt]), driven, resolution(response))[0]
         free = response.record.of_body and _decays(fit.rest[begun:], turns)
-        kind = FREE if free else UNNAMED
+        kind = OF_LOAD if of_load else FREE if free else UNNAMED
         peaks.append(Unnamed(frequency=turns / dt, amplitudes=amplitude[k], kind=kind))
     return peaks
 

@@ -68,5 +68,5 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
     return Response(
         model="point-kernel", times=np.array(times), probes=probes, values=stimulation,
-        quantity=PRESSURE.name, effort=effort,
+        quantity=PRESSURE.name, effort=effort, load=pressure,
     )  # fmt: skip

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model import drawing
-from simple_model.load.line_names import line_names
+from simple_model.load.line_names import FEWEST_CYCLES, SAME_LINE, line_names
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
+from simple_model.load.tacton import exact_period, repetition_frequencies
 from simple_model.numbers import plural, significant
 from simple_model.quantities import DISPLACEMENT, PRESSURE, NotApplicable, Quantity, quantity
 from simple_model.spectra import Lines, Spectrum, cosines
@@ -301,7 +302,24 @@ def phasors(response: Response, frequencies: ArrayLike, *, settle: float = SETTL
 
 def resolution(response: Response, *, settle: float = SETTLE) -> float:
     """Frequency resolution in Hz, one over the fitted time: lines further apart are resolved."""
-    return 1 / float((1 - settle) * np.ptp(response.times))
+    whole = whole_periods(response, settle)
+    return (1 - ALIKE) / whole if whole else 1 / float((1 - settle) * np.ptp(response.times))
+
+
+def whole_periods(response: Response, settle: float = SETTLE) -> float:
+    """Return the time in s of the whole periods of a load at the end of its response.
+
+    It is 0 unless a rhythm or a signal repeats too few times for the Kaiser window. Over whole
+    periods all lines of the load are orthogonal, without a window.
+    """
+    load, seconds = response.load, step(response.times) * len(response.times)
+    if load is None or not load.tacton.is_sampled:
+        return 0.0
+    kept = (1 - settle) * seconds
+    if min(repetition_frequencies(load.tacton).values()) * kept >= LINE_BINS:
+        return 0.0
+    period = exact_period(load.tacton)
+    return period * int(kept / period * (1 + ALIKE)) if period else 0.0
 
 
 def are_resolved(
@@ -358,14 +376,25 @@ def is_masked(
     settle: float = SETTLE,
 ) -> Bools:
     """Return a mask (f,) of lines that side lobes of unfitted lines, of amplitudes `rest` (f,), may
-    change by 5 %, or by 5 % of `FAINT` of the strongest.
+    change by 5 %, or by 5 % of `FAINT` of the strongest. A rhythm that does not repeat masks all.
     """
+    if _is_single(response):
+        return np.ones(len(frequencies), bool)
+    if whole_periods(response, settle):
+        return np.zeros(len(frequencies), bool)
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
     x = np.pi * (frequencies[:, None] - frequencies[rest > 0]) / least
     beta = _beta(_closest(distinct, 1 / least))
     leakage = np.sqrt(_kaiser_transform(x, beta) ** 2 @ rest[rest > 0] ** 2)  # for any phases
     return np.asarray(leakage > MINOR * np.maximum(strengths, FAINT * strengths.max(initial=0.0)))
+
+
+def _is_single(response: Response) -> bool:
+    """Whether the load has a rhythm that repeats too few times in the response to make lines."""
+    rhythm = response.load.tacton.rhythm if response.load else None
+    seconds = step(response.times) * len(response.times)
+    return rhythm is not None and seconds < FEWEST_CYCLES * (1 - SAME_LINE) * rhythm.period
 
 
 def _kaiser_transform(x: Floats, beta: float) -> Floats:
@@ -379,7 +408,8 @@ def fit_lines(
 ) -> tuple[Complex, Floats]:
     """Return `phasors` (f, p), and the whole response (t, p) minus these lines and the mean."""
     t, x = response.times, response.values
-    basis, weighted, inverse, which = _weighted_waves(t, frequencies, settle)
+    whole = whole_periods(response, settle)
+    basis, weighted, inverse, which = _weighted_waves(t, frequencies, settle, whole)
     fitted = inverse @ (weighted @ x[-weighted.shape[1] :])
     cosine, sine = np.split(fitted[1:], 2)
     amplitudes = np.vstack([fitted[:1], cosine - 1j * sine])[which]
@@ -400,10 +430,11 @@ def line_rows(
 
 
 def _weighted_waves(
-    times: Floats, frequencies: ArrayLike, settle: float
+    times: Floats, frequencies: ArrayLike, settle: float, whole: float = 0.0
 ) -> tuple[Floats, Floats, Floats, Ints]:
     """Waves (m, t), the same under the window (m, k) at the k fitted samples at the end, the
-    inverse (m, m) of their products, and the index (f,) of the wave of each line.
+    inverse (m, m) of their products, and the index (f,) of the wave of each line. There is no
+    window over a time of `whole_periods` in s.
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     nyquist = 0.5 / step(times)
@@ -413,10 +444,13 @@ def _weighted_waves(
     span = float(np.ptp(times[first:]))
     if not span:
         raise ValueError(f"{len(times)} samples are too few to fit lines; record more")
-    distinct, which = _distinct(frequencies, 1 / span)
+    if whole:
+        first, span = len(times) - round(whole / step(times)), whole
+    distinct, which = _distinct(frequencies, (1 - ALIKE) / span if whole else 1 / span)
     basis = _waves(distinct, times)
     fitted = basis[:, first:]
-    weighted = fitted * np.kaiser(fitted.shape[1], _beta(_closest(distinct, span)))
+    beta = 0.0 if whole else _beta(_closest(distinct, span))
+    weighted = fitted * np.kaiser(fitted.shape[1], beta)
     inverse = np.linalg.pinv(weighted @ fitted.T, rcond=1e-13, hermitian=True)
     return basis, weighted, np.asarray(inverse, np.float64), which
 

@@ -12,7 +12,7 @@ from skinwave.scene.scene import BODIES
 USED = {
     "bodies": "openBody", "maps": "contours drawMap mapControls",
     "files": "linesCsv readMeasurement sceneToml waveformCsv waveformWav", "kernel": "respond",
-    "load": "loadLines spot", "evaluate": "MAP_LINE amplitudesOf levelOf levelOver mapOf meanLevel "
+    "load": "loadLines spot", "evaluate": "MAP_LINE amplitudesOf levelOf levelOver mapOf "
     "namesOf phaseDelay pressureThresholdAt reach shareOutside spectrum thresholdAt",
     "address": "fromAddress toAddress", "values": "STARTS check loadOf", "view3d": "openView",
 }  # fmt: skip

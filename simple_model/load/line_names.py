@@ -34,7 +34,8 @@ SYMBOLS = ("f_d", "f_AM", "f_AM2", "f_e", "f_s", "f_r")
 WEAKEST = 1e-3  # of the strongest line: -60 dB
 MOST = 200  # lines
 SAME_LINE = 1e-3  # over the duration: closer lines in Hz coincide
-FEWEST_PERIODS = 1.5  # in a Tacton, for a line of its own
+FEWEST_PERIODS = 1.5  # of a recording in a Tacton, for a line of its own
+FEWEST_CYCLES = 4 / 3  # of a rhythm or signal: one remains after a quarter of the Tacton
 PERIOD_SAMPLES = 2**14  # of a rhythm or signal
 ROUND_OFF = 1e-10  # of the strongest harmonic of the path, its mean
 MOST_HARMONICS = 400  # of a path
@@ -123,6 +124,17 @@ def line_names(
     )
 
 
+def during_pulses(pressure: MovingPressure) -> MovingPressure:
+    """Return the load while a pulse is on: without its rhythm.
+
+    If nothing else makes lines, return the load itself, because the rhythm is then its modulation.
+    """
+    if pressure.tacton.rhythm is None:
+        return pressure
+    steady = replace(pressure, tacton=replace(pressure.tacton, rhythm=None))
+    return steady if line_names(steady).names else pressure
+
+
 def line_frequency(tacton: Tacton, name: str) -> float | None:
     """Return the frequency in Hz of a line by its name; None if the Tacton does not have all its
     tones.
@@ -145,7 +157,8 @@ def symbols(tacton: Tacton) -> Floats:
         signal.rate / len(signal.samples) if signal else 0.0,
         1 / rhythm.period if rhythm else 0.0,
     )
-    repeated = [f if f * tacton.duration >= FEWEST_PERIODS else 0.0 for f in slow]
+    fewest = FEWEST_CYCLES * (1 - SAME_LINE)
+    repeated = [f if f * tacton.duration >= fewest else 0.0 for f in slow]
     return np.array([0.0 if once else f_d, f_1 * (w1 > 0), f_2 * (w2 > 0), f_e, *repeated])
 
 

@@ -192,11 +192,24 @@ def pattern_period(tacton: Tacton) -> float:
     f = np.array(list(by_name.values()))
     if not len(f) or f.min() * tacton.duration < 1 - COMMENSURATE:
         return tacton.duration
-    turns = np.outer(np.arange(1, int(f.min() * tacton.duration + COMMENSURATE) + 1), f / f.min())
-    exact = (np.abs(turns - np.round(turns)) <= COMMENSURATE * turns).all(axis=1)
-    if exact.any():
-        return min(float((np.argmax(exact) + 1) / f.min()), tacton.duration)
+    if exact := exact_period(tacton, tacton.duration):
+        return min(exact, tacton.duration)
     return _near_return(f, _slowest_beat(by_name, tacton.duration), tacton.duration)
+
+
+def exact_period(tacton: Tacton, longest: float = LONGEST) -> float:
+    """Return the period in s after which all parts of a Tacton repeat exactly; 0 if it exceeds
+    `longest` in s.
+
+    >>> exact_period(Tacton(am_frequency=140.0, rhythm=Rhythm(pulses=((0.05, 0.03),))))
+    0.4
+    """
+    f = np.array(list(repetition_frequencies(tacton).values()))
+    if not len(f):
+        return 0.0
+    turns = np.outer(np.arange(1, int(f.min() * longest + COMMENSURATE) + 1), f / f.min())
+    exact = (np.abs(turns - np.round(turns)) <= COMMENSURATE * turns).all(axis=1)
+    return float((np.argmax(exact) + 1) / f.min()) if exact.any() else 0.0
 
 
 def _symmetry(foci: tuple[float, ...]) -> int:

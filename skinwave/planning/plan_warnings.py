@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from simple_model import Response, Statement
-from simple_model.load.line_names import line_names
+from simple_model import MovingPressure, Response, Statement, resolved_lines
+from simple_model.load.line_names import FEWEST_CYCLES, line_names, named_lines
 from simple_model.load.sampling import step
-from simple_model.numbers import EN_DASH, significant
-from simple_model.response import resolution
+from simple_model.load.tacton import LONGEST, exact_period
+from simple_model.numbers import EN_DASH, plural, significant
+from simple_model.response import LINE_BINS, SETTLE, resolution
 from skinwave.models import named
 from skinwave.models.limits import cures_for, in_words
 from skinwave.planning.estimates import mean_gain
@@ -39,6 +40,7 @@ def response_warnings(scene: Scene, response: Response) -> tuple[str, ...]:
         *large_deflection(scene, response),
         *lines_left_out(scene, response),
         *lines_unresolved(scene, response),
+        *rhythm_unresolved(scene, response),
     )
 
 
@@ -74,7 +76,9 @@ def lines_left_out(scene: Scene, response: Response) -> tuple[str, ...]:
 
 
 def lines_unresolved(scene: Scene, response: Response) -> tuple[str, ...]:
-    """Warn of a response too short for the strongest line of its load."""
+    """Warn of a response too short for the strongest line of a load without a rhythm."""
+    if scene.tacton.rhythm:
+        return ()
     lines = line_names(scene.pressure, WEAK_LINE_RATIO)
     least = resolution(response)
     moving = np.where(lines.frequencies > 0, lines.strengths, 0.0)
@@ -86,6 +90,48 @@ def lines_unresolved(scene: Scene, response: Response) -> tuple[str, ...]:
         f"{lines.names[moving.argmax()]} at {f:.4g} Hz, so that tables of lines leave it out; use "
         f"duration_s = {1.1 * length * least / f:.2g} or more",
     )
+
+
+def rhythm_unresolved(scene: Scene, response: Response) -> tuple[str, ...]:
+    """Warn of strong lines of a rhythm that the response is too short to resolve."""
+    tacton, rhythm, dt = scene.tacton, scene.tacton.rhythm, step(response.times)
+    seconds = dt * len(response.times)
+    lost = rhythm is not None and _count_unresolved(scene.pressure, seconds, dt)
+    if not (rhythm and lost):
+        return ()
+    many = LINE_BINS / (1 - SETTLE) * rhythm.period * 2.0 ** np.arange(8)
+    enough = (
+        longer for longer in sorted([FEWEST_CYCLES * exact_period(tacton), *many])
+        if tacton.duration < longer <= LONGEST and not _count_unresolved(
+            replace(scene.pressure, tacton=replace(tacton, duration=longer)), longer, dt
+        )
+    )  # fmt: skip
+    longer = next(enough, 0.0)
+    duration = np.ceil(1e3 * (longer or FEWEST_CYCLES * rhythm.period) - 1e-6) / 1e3
+    cure = f"set duration_s to {duration:g}"
+    if not longer:
+        cure = (
+            f"use frequencies that are multiples of {1 / rhythm.period:.6g} Hz, and duration_s = "
+            f"{duration:g} or more"
+        )
+    return (
+        f"{plural(lost, 'line')} of the rhythm, whose period is {rhythm.period:g} s, cannot be "
+        f"resolved in {seconds:.3g} s; {cure}",
+    )
+
+
+def _count_unresolved(pressure: MovingPressure, seconds: float, dt: float) -> int:
+    """Return the number of strong lines that a response of some seconds does not resolve, or 1 if a
+    rhythm does not repeat often enough to make lines.
+    """
+    strong, rhythm = named_lines(pressure, WEAK_LINE_RATIO), pressure.tacton.rhythm
+    if rhythm and not strong:
+        return int(seconds < FEWEST_CYCLES * rhythm.period)
+    times = np.linspace(0.0, seconds, round(seconds / dt), endpoint=False)
+    still = Response(
+        model="", times=times, probes=np.zeros((1, 2)), values=np.zeros((len(times), 1))
+    )
+    return len(strong.keys() & resolved_lines(pressure, still)[1])
 
 
 def implausible(scene: Scene) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from simple_model import sensation_level, spectrum, threshold
+from simple_model import spectrum, threshold
 from simple_model.drawing import small
 from simple_model.quantities import DISPLACEMENT, Quantity
 from simple_model.threshold import BAND, HIGHEST, LOWEST
@@ -207,19 +207,16 @@ def sensation_levels(run: Run, probe: int) -> dict[str, float]:
 
     It is empty unless the body is skin.
     """
-    if not run.is_skin:
-        return {}
-    levels = {
-        name: float(sensation_level(run.table.amplitudes[name][probe], frequency))
-        for name, frequency in run.line_hz.items()
-    }
+    names = run.in_pulses.frequencies if run.levels else ()
+    levels = {name: float(run.levels[name][probe]) for name in names}
     return dict(sorted(levels.items(), key=lambda item: -item[1]))
 
 
 def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
     """Draw lines and their names: by sensation level or, if not skin, by amplitude."""
-    amplitudes = {name: float(values[probe]) for name, values in run.table.amplitudes.items()}
-    names = sorted(run.line_hz, key=lambda name: -amplitudes[name])
+    table = run.in_pulses if run.is_skin else run.table
+    amplitudes = {name: float(values[probe]) for name, values in table.amplitudes.items()}
+    names = sorted(amplitudes, key=lambda name: -amplitudes[name])
     if run.is_skin:
         levels = sensation_levels(run, probe)
         names = [name for name, level in levels.items() if level > LOWEST_LEVEL]
@@ -228,7 +225,7 @@ def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
         ax.plot(f, curve, **CURVE)
         ax.fill_between(f, curve / factor, curve * factor, lw=0, **THRESHOLD_BAND)
     per_unit, style = run.response.record.per_unit, line_style(run.column)
-    frequencies = np.array([run.line_hz[name] for name in names])
+    frequencies = np.array([table.frequencies[name] for name in names])
     heights = per_unit * np.array([amplitudes[name] for name in names])
     ax.vlines(frequencies, 1e-4, heights, color=style["color"], lw=1.2)
     ax.plot(frequencies, heights, ls="none", **style)
@@ -240,7 +237,8 @@ def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
     ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
     ax.set_title(run_label(run), pad=4 + NAME_ROWS * ROW * small())
     ax.grid(alpha=0.25)
-    name_lines(ax, {name: run.line_hz[name] for name in names[:MOST_NAMED]}, width, NAME_ROWS)
+    named = {name: table.frequencies[name] for name in names[:MOST_NAMED]}
+    name_lines(ax, named, width, NAME_ROWS)
 
 
 @with_style

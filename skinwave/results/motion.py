@@ -55,12 +55,14 @@ INWARDS = np.array([[0.0, 0.0, -1.0]])  # the drawn component of normal motion
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BodyMotion:
     """Motion of a meshed body under a load: `motion` in reduced coordinates (r,), and their
-    `basis` (3 n, r) at all nodes of the mesh of `build`.
+    `basis` (3 n, r) at all nodes of the mesh of `build`; `in_pulses` is the motion while a pulse of
+    the load's rhythm is on.
     """
 
     build: Build
     basis: Floats
     motion: ReducedResponse
+    in_pulses: ReducedResponse
     effort: Effort
 
     @cached_property
@@ -138,14 +140,16 @@ def reduced_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
             solver=options.solver, report=report,
         )  # fmt: skip
     with clock("lines"):
-        motion = respond(reduced, *scene.loads)
+        motion = in_pulses = respond(reduced, *scene.loads)
+        if (steady := scene.during_pulses) is not scene:
+            in_pulses = respond(reduced, *steady.loads)
     offline = with_cost(reduced.effort, clock, build, options.h or default_size(scene.body))
     effort = replace(
         offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
         radiated=motion.radiated,
     )  # fmt: skip
     basis = np.ascontiguousarray(model.basis)  # its rows are read a few at a time
-    return BodyMotion(build=build, basis=basis, motion=motion, effort=effort)
+    return BodyMotion(build=build, basis=basis, motion=motion, in_pulses=in_pulses, effort=effort)
 
 
 def probe_lines(scene: Scene, moved: BodyMotion) -> ReducedResponse:

@@ -3,7 +3,8 @@
 - Share outside: integral of squared RMS motion where the kernel's RMS is 20 dB below its largest,
   over the integral everywhere, both within 44 mm of the origin along x and y.
 - Spread: largest distance from the path at which the RMS is within 6 dB of the largest.
-- Reach: largest distance from the path at which a component is above its detection threshold.
+- Level: largest over components of amplitude over detection threshold, while a pulse is on.
+- Reach: largest distance from the path at which a component is above its threshold, likewise.
 - Phase delay: phase difference of motion and kernel pressure at one probe, over 2 pi f.
 
 All are of the steady vibration about its mean.
@@ -31,7 +32,8 @@ FACTOR_OF_TWO = 20 * np.log10(2.0)  # dB: the uncertainty of a device's pressure
 @dataclass(frozen=True, kw_only=True)
 class Component:
     """A spectral line at the probe where it is strongest: frequency in Hz, amplitude in the unit of
-    the response, and sensation level in dB, or None if the body is not skin.
+    the response, and sensation level in dB. The level is None if the body is not skin, or for side
+    lines of a rhythm.
     """
 
     name: str
@@ -140,20 +142,19 @@ def strongest_component(run: Run, *, by_sensation: bool = False) -> Component | 
     """Return the line of largest amplitude or, with `by_sensation`, of highest sensation level, at
     any probe; None if nothing vibrates.
     """
-    names = [name for name, f in run.frequencies.items() if f > 0]
-    amplitudes = np.array([run.lines[name] for name in names])
+    table = run.in_pulses if by_sensation else run.table
+    names, frequencies = list(table.frequencies), np.array([*table.frequencies.values()])
+    amplitudes = np.array([table.amplitudes[name] for name in names])
     if not amplitudes.any():
         return None
-    frequencies = np.array([run.frequencies[name] for name in names])
-    levels = sensation_level(amplitudes, frequencies[:, None])
-    ranked = levels if by_sensation else amplitudes
+    ranked = sensation_level(amplitudes, frequencies[:, None]) if by_sensation else amplitudes
     line, probe = np.unravel_index(int(np.argmax(ranked)), ranked.shape)
     return Component(
         name=names[line],
         frequency=float(frequencies[line]),
         amplitude=float(amplitudes[line, probe]),
         probe=int(probe),
-        level=float(levels[line, probe]) if run.is_skin else None,
+        level=float(run.levels[names[line]][probe]) if names[line] in run.levels else None,
     )
 
 

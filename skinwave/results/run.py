@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from simple_model import LineTable, Response, Unnamed, line_table, spectrum
+from simple_model import LineTable, Response, Unnamed, line_table, sensation_level, spectrum
+from simple_model.line_table import lines_in_pulses
 from simple_model.load.line_names import SAME_LINE, line_frequency
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
@@ -56,12 +57,34 @@ class Run(OfTacton):
     @cached_property
     def table(self) -> LineTable:
         """All lines of the response, each once."""
-        candidates = ASSESSED if len(self.scene.tacton.foci) == 1 else ()
         motion = self.scene.load.support_motion
         support = {SUPPORT: motion.frequency} if motion and self.response.record.of_body else {}
         return line_table(
-            self.scene.pressure, self.response, candidates=candidates, other_lines=support
+            self.scene.pressure, self.response, candidates=self._assessed, other_lines=support
         )
+
+    @cached_property
+    def in_pulses(self) -> LineTable:
+        """Lines while a pulse is on, by which levels are defined; see `lines_in_pulses`."""
+        if self.scene.tacton.rhythm is None:
+            return self.table
+        return lines_in_pulses(self.scene.pressure, self.response, candidates=self._assessed)
+
+    @cached_property
+    def levels(self) -> dict[str, Floats]:
+        """Sensation levels (p,) in dB of the lines while a pulse is on; empty unless on skin."""
+        if not self.is_skin:
+            return {}
+        lines = self.in_pulses
+        own = own_names(self.scene, lines.frequencies)
+        return {
+            name: sensation_level(lines.amplitudes[line], lines.frequencies[line])
+            for name, line in own.items()
+        }
+
+    @property
+    def _assessed(self) -> tuple[str, ...]:
+        return ASSESSED if len(self.scene.tacton.foci) == 1 else ()
 
     @property
     def line_hz(self) -> dict[str, float]:

@@ -66,8 +66,8 @@ class SurfaceField:
     x, y : (nx,), (ny,) float, m, equally spaced
     rms : (ny, nx) float, in the SI unit of the quantity; nan off the body
     quantity : Quantity; the pressure for the point kernel
-    level : (ny, nx) float, dB, highest sensation level of a component, nan off the body; None
-        unless the map shows the displacement of skin
+    level : (ny, nx) float, dB, highest sensation level of a component while a pulse is on, nan off
+        the body; None unless the map shows the displacement of skin
     depth : float, m, below the surface
     note : str, method of computation
     error : float, expected error relative to the largest RMS, or nan
@@ -134,8 +134,11 @@ def body_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions = DEFAULT
     if options.h is None and takes(FROM_REST, scene):
         return _plate_map(scene, x, y, options.model)
     if has_wavenumber_integral(scene):
-        lines = _interpolate(scene.pressure, surface_lines(scene), x, y)
-        return _field(scene, x, y, lines, "laterally infinite layer")
+
+        def lines_of(scene: Scene) -> Lines:
+            return _interpolate(scene.pressure, surface_lines(scene), x, y)
+
+        return _field(scene, x, y, lines_of, "laterally infinite layer")
     size = max(options.h or 0.0, COARSER[scene.body.of_kind.is_plate] * default_size(scene.body))
     moved = reduced_motion(scene, replace(options, tolerance=MAP_TOLERANCE, h=size))
     return replace(element_map(scene, moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
@@ -146,7 +149,7 @@ def _plate_map(scene: Scene, x: Floats, y: Floats, model: str = "auto") -> Surfa
     places = _places(x, y)
     is_linear = model != "auto" and not named(model).is_nonlinear
     if is_linear or not stretches(scene, MAP_TOLERANCE):
-        return _field(scene, x, y, plate_lines(scene, places), "thin plate")
+        return _field(scene, x, y, partial(plate_lines, places=places), "thin plate")
     _, z, modes = steady_motion(scene, MAP_TOLERANCE)
     shapes, covariance = modes.at(places - scene.body.placement.offset), np.cov(z, rowvar=False)
     rms = np.sqrt(np.einsum("pi,ij,pj->p", shapes, covariance, shapes, optimize=True))
@@ -180,8 +183,11 @@ def quantity_map(
     x, y = grid(scene, reach, step)
     if has_wavenumber_integral(scene):
         body, places = field_read(scene, scene.depths[0]), _places(x, y)
-        lines = field_lines(body, scene.pressure, places, threshold=NEGLIGIBLE_LINE_RATIO)
-        return _field(scene, x, y, lines, "wavenumber integral of the laterally infinite body")
+
+        def lines_of(scene: Scene) -> Lines:
+            return field_lines(body, scene.pressure, places, threshold=NEGLIGIBLE_LINE_RATIO)
+
+        return _field(scene, x, y, lines_of, "wavenumber integral of the laterally infinite body")
     if options.h is None and scene.reading.is_plain and takes(FROM_REST, scene):
         error = Statement(parts=own_parts(FROM_REST, scene, None)).error
         return replace(_plate_map(scene, x, y), error=error)
@@ -212,10 +218,14 @@ def element_map(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> Surfac
         on_body[on_body] = fem.is_inside(mesh, points - depth * normals)
     there = Reading(quantity=quantity.name, depths=(depth,) * int(on_body.sum()) if depth else ())
     rows, solids = probe_rows(scene.body, moved.build, places[on_body], there)
-    motion = read_at(moved.motion, rows @ moved.basis)
-    factor = line_factor(quantity, 2j * np.pi * motion.frequencies, solids, rows.shape[0])
-    lines = motion.frequencies, motion.lines * factor
-    return _field(scene, x, y, lines, "finite elements", on_body)
+    outputs = rows @ moved.basis
+
+    def lines_of(which: Scene) -> Lines:
+        motion = read_at(moved.motion if which is scene else moved.in_pulses, outputs)
+        factor = line_factor(quantity, 2j * np.pi * motion.frequencies, solids, rows.shape[0])
+        return motion.frequencies, motion.lines * factor
+
+    return _field(scene, x, y, lines_of, "finite elements", on_body)
 
 
 def save(path: Path, field: SurfaceField) -> None:
@@ -257,19 +267,24 @@ def _places(x: Floats, y: Floats) -> Floats:
 
 
 def _field(
-    scene: Scene, x: Floats, y: Floats, lines: Lines, note: str,
+    scene: Scene, x: Floats, y: Floats, lines_of: Callable[[Scene], Lines], note: str,
     on_body: np.ndarray | None = None,
 ) -> SurfaceField:  # fmt: skip
-    """Return the map from lines (f,), (f, p c) at all places, or at those `on_body` (ny nx,)."""
+    """Return the map from lines (f,), (f, p c) of a scene at all places, or at those `on_body` (ny
+    nx,). Levels are of the lines while a pulse is on.
+    """
+    lines = lines_of(scene)
     quantity = scene.reading.record
     where = np.ones(len(x) * len(y), bool) if on_body is None else on_body
     count, has_level = int(where.sum()), scene.reading.is_plain and scene.body.is_skin
     values = np.full((2, len(where)), np.nan)
     values[0, where] = _rms(quantity, lines, count)
     if has_level:
-        moving = lines[0] > LOWEST_FREQUENCY
-        amplitudes = np.abs(lines[1][moving]).reshape(int(moving.sum()), count)
-        levels = sensation_level(amplitudes, lines[0][moving, None])
+        steady = scene.during_pulses
+        f, felt = lines if steady is scene else lines_of(steady)
+        moving = f > LOWEST_FREQUENCY
+        amplitudes = np.abs(felt[moving]).reshape(int(moving.sum()), count)
+        levels = sensation_level(amplitudes, f[moving, None])
         values[1, where] = np.maximum(levels.max(axis=0, initial=-np.inf), LOWEST_LEVEL)
     rms, level = values.reshape(2, len(y), len(x))
     return SurfaceField(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simple_model import MovingPressure, Tacton
+from simple_model.load.line_names import during_pulses
 from simple_model.quantities import DISPLACEMENT, STRAIN, Quantity, quantity
 from skinwave.bodies import (
     BODIES,
@@ -189,6 +190,12 @@ class Scene:
     def loads(self) -> tuple[MovingPressure, ...]:
         """Components (c,) of the load, each a moving scalar in the direction of its kind."""
         return self.load.pressures(self.pressure)
+
+    @property
+    def during_pulses(self) -> Scene:
+        """The scene while a pulse of its rhythm is on; see `line_names.during_pulses`."""
+        steady = during_pulses(self.pressure)
+        return self if steady is self.pressure else replace(self, pressure=steady)
 
     @property
     def probe_points(self) -> Floats:

@@ -19,8 +19,8 @@ export function respond(values, body) {
   const kernel = respondOfKernel(load), waves = body.respond(load);
   const [kernelAt, wavesAt] = [kernel.at(x, y), waves.at(x, y)];
   return { values, body, load, x, y, kernel, waves, kernelAt, wavesAt,
-    level: body.is_skin ? levelOf(load, waves.f, wavesAt, "m") : null,
-    kernelLevel: levelOf(load, kernel.f, kernelAt, "Pa") };
+    level: body.is_skin ? levelOf(waves.f, wavesAt, "m") : null,
+    kernelLevel: levelOf(kernel.f, kernelAt, "Pa") };
 }
 
 /** Typeset name of the line at a frequency in Hz, such as "2 f_d − f_AM"; "" if it is unknown. */
@@ -39,7 +39,7 @@ export const NUMBERS_OF_MAPS = ["maps", "share", "kernelShare", "reach", "kernel
 /** Maps of the kernel and the waves, and the numbers that need them. */
 export function mapsOf(answer) {
   const { kernel, waves, load, body } = answer;
-  const maps = { kernel: mapOf(kernel, load), waves: mapOf(waves, load) };
+  const maps = { kernel: mapOf(kernel), waves: mapOf(waves) };
   return {
     maps, share: shareOutside(maps.kernel.rms, maps.waves.rms),
     kernelShare: shareOutside(maps.kernel.rms, maps.kernel.rms),

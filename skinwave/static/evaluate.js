@@ -58,14 +58,13 @@ export function amplitudesOf(f, { re, im }, rate = 0) {
 }
 
 /**
- * Highest level of the lines at a place, averaged over the rhythm: {dB, f}; null if nothing moves there.
+ * Highest level of the lines at a place while a pulse is on: {dB, f}; null if nothing moves there.
  * `unit` is "m" or "Pa".
  */
-export function levelOf(load, f, at, unit = "m") {
-  const mean = meanLevel(load);
+export function levelOf(f, at, unit = "m") {
   let best = null;
   amplitudesOf(f, at).forEach((amplitude, l) => {
-    const dB = sensationLevel(mean * amplitude, f[l], unit);
+    const dB = sensationLevel(amplitude, f[l], unit);
     if (dB > (best ? best.dB : -Infinity)) best = { dB, f: f[l] };
   });
   return best;
@@ -75,14 +74,14 @@ export function levelOf(load, f, at, unit = "m") {
 export const MAP_LINE = Float64Array.from({ length: SIDE }, (_, k) => HALF * (2 * k / (SIDE - 1) - 1));
 
 /**
- * Map of a motion {rms, level} by row y and column x; NaN off the body. `rms` is about the mean during a
- * pulse; `level` in dB is that of the highest line, averaged over the rhythm.
+ * Map of a motion {rms, level} while a pulse is on, by row y and column x; NaN off the body. `rms` is about
+ * the mean; `level` in dB is that of the highest line.
  */
-export function mapOf(motion, load) {
-  const { re, im } = motion.onGrid(MAP_LINE, MAP_LINE), places = SIDE * SIDE, mean = meanLevel(load);
+export function mapOf(motion) {
+  const { re, im } = motion.onGrid(MAP_LINE, MAP_LINE), places = SIDE * SIDE;
   const rms = new Float32Array(places), level = new Float32Array(places), unit = motion.unit || "m";
   motion.f.forEach((f, l) => {
-    const least = (unit === "m" ? thresholdAt(f) : pressureThresholdAt(f)) / mean, known = least > 0;
+    const least = unit === "m" ? thresholdAt(f) : pressureThresholdAt(f), known = least > 0;
     for (let p = 0, k = l * places; p < places; p++, k++) {
       const square = re[k] * re[k] + im[k] * im[k];
       rms[p] += square / 2;
@@ -217,8 +216,8 @@ export function namesOf(load) {
 
 /**
  * Table of the lines of an answer at the point, the strongest first: [{name, f, motion, pressure, level}],
- * with `motion` in SI units of the quantity, the kernel's `pressure` in Pa, and `level` in dB or null if the
- * body is not skin.
+ * with `motion` in SI units of the quantity and the kernel's `pressure` in Pa, averaged over the rhythm, and
+ * `level` in dB while a pulse is on, or null if the body is not skin.
  */
 export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt, names = namesOf(load) }) {
   const { rate } = QUANTITIES[values.quantity], mean = meanLevel(load);
@@ -227,7 +226,7 @@ export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt
   return Array.from(waves.f, (f, l) => {
     const own = kernel.f.findIndex((at) => Math.abs(at - f) < 1e-6);
     return { name: names(f), f, motion: mean * motion[l], pressure: own < 0 ? 0 : mean * pressure[own],
-      level: body.is_skin ? sensationLevel(mean * moved[l], f) : null };
+      level: body.is_skin ? sensationLevel(moved[l], f) : null };
   }).filter((_, l) => motion[l] > least).sort((a, b) => b.motion - a.motion);
 }
 

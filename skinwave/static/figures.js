@@ -126,7 +126,10 @@ function measuredSpectrum(measured, answer, per, highest) {
   return { x: f.slice(0, count), y: a.slice(0, count).map((v) => per * v) };
 }
 
-/** Plot of the spectra as stems side by side, averaged over the rhythm, with the threshold of skin. */
+/**
+ * Plot of the spectra as stems side by side, averaged over the rhythm. The threshold of skin is drawn for
+ * lines that exceed it while a pulse is on.
+ */
 export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
   const { kernel, waves, body, values: { quantity: name } } = answer, { unit, per, rate } = QUANTITIES[name];
   const mean = meanLevel(answer.load);
@@ -156,7 +159,7 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
   if (body.is_skin && !rate) {
     const x = Array.from({ length: 120 }, (_, k) => 10 + k * (highest - 10) / 119);
     curves.push({ role: "threshold", axis: "y2", name: "threshold", dash: "5 3", x,
-      y: x.map((f) => per * thresholdAt(f)) });
+      y: x.map((f) => per * mean * thresholdAt(f)) });
   }
   const names = own.x.map((f, k) => ({ x: f, y: own.y[k], axis: "y2", text: lineName(answer, f) }));
   const least = LEAST_NAMED * largestOf(own.y);

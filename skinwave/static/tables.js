@@ -22,9 +22,11 @@ function numbersOf({ body, level, reach, share, delay }) {
 }
 
 const TILES = {
-  level: ["Level at the point", "Level of the largest component above the detection threshold of skin"],
+  level: ["Level at the point", "Level of the largest component above the detection threshold of skin, "
+    + "while a pulse is on"],
   reach: ["Reach above threshold",
-    "Largest distance from the path at which a component is above the detection threshold"],
+    "Largest distance from the path at which a component is above the detection threshold, "
+    + "while a pulse is on"],
   share: ["Outside the kernel's region",
     "Share of the mean-square motion where the kernel is below −20 dB of its largest"],
   delay: ["Delay", "Lag of the motion behind the pressure on the path, at the strongest component"],
@@ -34,7 +36,7 @@ const TILES = {
 export function tiles(answer, pinned) {
   const own = numbersOf(answer), other = pinned && numbersOf(pinned), { level, reach, load, body } = answer;
   const line = level ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})${
-    load.pulses ? ", mean over the rhythm" : ""}` : "";
+    load.pulses ? ", pulse on" : ""}` : "";
   const onSkin = (text) => (body.is_skin ? text : "not skin, no threshold");
   const details = { level: onSkin(line), reach: onSkin(reach ? "from the path" : ""), share: "of the motion",
     delay: "behind the pressure" };

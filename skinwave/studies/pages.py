@@ -332,7 +332,8 @@ def _threshold_text(effect: Propagation) -> str | None:
     if not effect.above_threshold:
         return None
     half, once, twice = (_millimetre(each) or "none" for each in effect.above_threshold)
-    return f"{once} mm ({half} to {twice} mm)" if half != twice else f"{once} mm"
+    text = once if once == "none" else f"{once} mm"
+    return f"{text} ({half} to {twice} mm)" if half != twice else text
 
 
 def _component(component: Component | None, quantity: Quantity = DISPLACEMENT) -> str:

@@ -22,10 +22,13 @@ from matplotlib.figure import Figure
 
 from fem import NotReduced
 from simple_model import Effort, MovingPressure, Response, lines, resolved_lines, sensation_level
+from simple_model.line_table import lines_in_pulses
 from simple_model.load.drive import usual_drive
 from simple_model.numbers import decibel, share_of, significant
+from simple_model.point_kernel import published_load
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
+from skinwave.models.point_kernel import PUBLISHED
 from skinwave.planning.assessment import all_warnings
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import png
@@ -294,11 +297,14 @@ def _changes(reference: Response, candidate: Response) -> tuple[Floats, float]:
 
 def _level(scene: Scene, response: Response) -> float:
     """Return the highest sensation level in dB of a line at any probe, or minus infinity."""
-    if not (names := compared_lines(scene, response)):
-        return -np.inf
-    f = np.array([*names.values()])
-    unit = "m" if response.record.of_body else "Pa"
-    return float(sensation_level(lines(response, f), f[:, None], unit=unit).max())
+    unit, pressure = "m" if response.record.of_body else "Pa", scene.pressure
+    acting = published_load(pressure) if response.model == PUBLISHED.name else pressure
+    table = lines_in_pulses(acting, response, candidates=ASSESSED)
+    levels = [
+        sensation_level(table.amplitudes[name], f, unit=unit).max()
+        for name, f in table.frequencies.items() if f < HIGHEST
+    ]  # fmt: skip
+    return float(max(levels, default=-np.inf))
 
 
 def compared_lines(scene: Scene, response: Response) -> dict[str, float]:

@@ -77,7 +77,8 @@ def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> 
     size = significant(run.response.record.per_unit * float(run.table.amplitudes[name][probe]))
     if not run.is_skin:
         return [size]
-    level = levels[name]
+    if (level := levels.get(name)) is None:
+        return [size, ""]
     if level < FAINTEST:
         return [size, decibel(level)]
     return [size, f"{round(level):+d}" if round(level) else "0"]

@@ -12,10 +12,12 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from simple_model import MovingPressure, named_lines, phasors, sensation_level
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.flat_body import path_operator, steady_lines
+from simple_model.line_table import lines_in_pulses
 from simple_model.load.line_names import line_frequency
 from simple_model.load.spectrum import synthesise
 from simple_model.response import SETTLE
@@ -86,7 +88,8 @@ class Solution:
     waveform : (t, p) float, the last `SHOWN` of a Tacton
     lines : (f, p) float, amplitudes of the named lines
     rms : (p,) float
-    level : (p,) float, dB, highest sensation level as if on skin, at least `LOWEST_LEVEL`
+    level : (p,) float, dB, highest sensation level while a pulse is on, as if on skin, at least
+        `LOWEST_LEVEL`
     map_rms, map_level : (ny, nx) float, RMS and level on a map; empty without a map
     """
 
@@ -307,22 +310,15 @@ def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solu
     """Solve one sample, with the reduced-order model of the family if the body belongs to it
     (`together`); raise a ValueError if the model refuses the scene.
     """
-    shape: tuple[int, ...] = (0, 0)
-    how, family = method.options, method.family
-    if method.mapped:
-        shape, (f, a) = _map_lines(scene, method)
-    elif family and together:
-        size = how.h or default_size(family.scene.body)
-        f, a = lines_of(cached_shared_body(family, size, how.tolerance, how.solver), scene.body)
-        a = a * (scene.pressure.peak_pressure / family.scene.pressure.peak_pressure)
-    elif family:
-        motion = components(prepare(scene, how), *scene.loads)
-        f, a = motion.frequencies, motion.lines
-    else:
+    if not (method.mapped or method.family):
         return _compute(scene, method)
-    f, a = f[f > 0], a[f > 0]
-    p = len(scene.probes)
-    rms, levels = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2), _highest_level(f, np.abs(a))
+    f, a = _steady_lines(scene, method, together)
+    in_pulses, steady = (f, a), scene.during_pulses
+    if steady is not scene:
+        in_pulses = _steady_lines(steady, method, together)
+    p, (x, y) = len(scene.probes), map_axes(scene)
+    shape = (len(y), len(x)) if method.mapped else (0, 0)
+    rms, levels = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2), _highest_level(*in_pulses)
     return Solution(
         waveform=synthesise(f, a[:, :p], waveform_times(scene)),
         lines=_amplitudes_at(_frequencies(scene, method), f, np.abs(a[:, :p])),
@@ -331,15 +327,32 @@ def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solu
     )  # fmt: skip
 
 
-def _map_lines(scene: Scene, method: Method) -> tuple[tuple[int, int], tuple[Floats, Complex]]:
-    """Return the shape of the map, and lines by the wavenumber integral at probes and map."""
+def _steady_lines(scene: Scene, method: Method, together: bool) -> tuple[Floats, Complex]:
+    """Return the lines of a sample at the probes and, by the wavenumber integral, on the map."""
+    how, family = method.options, method.family
+    if method.mapped:
+        f, a = _map_lines(scene, method)
+    elif family and together:
+        pressure = replace(scene.pressure, peak_pressure=family.scene.pressure.peak_pressure)
+        family = replace(family, scene=replace(family.scene, pressure=pressure))
+        size = how.h or default_size(family.scene.body)
+        f, a = lines_of(cached_shared_body(family, size, how.tolerance, how.solver), scene.body)
+        a = a * (scene.pressure.peak_pressure / pressure.peak_pressure)
+    else:
+        motion = components(prepare(scene, how), *scene.loads)
+        f, a = motion.frequencies, motion.lines
+    return f[f > 0], a[f > 0]
+
+
+def _map_lines(scene: Scene, method: Method) -> tuple[Floats, Complex]:
+    """Return the lines by the wavenumber integral at probes and map."""
     x, y = map_axes(scene)
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     points, waves = np.vstack([scene.probe_points, places]), compliance(scene.body)
     if method.same_load:
         operator = _operator(scene.pressure, tuple(map(tuple, points.tolist())))
-        return (len(y), len(x)), operator(waves)
-    return (len(y), len(x)), steady_lines(waves, scene.pressure, points, threshold=NEGLIGIBLE_LINE)
+        return operator(waves)
+    return steady_lines(waves, scene.pressure, points, threshold=NEGLIGIBLE_LINE)
 
 
 @lru_cache(maxsize=2)
@@ -357,9 +370,14 @@ def _compute(scene: Scene, method: Method) -> Solution:
     motion = response.values[-len(waveform_times(scene)) :] - settled.mean(axis=0)
     frequencies, no_map = _frequencies(scene, method), np.zeros((0, 0))
     lines = np.abs(phasors(response, frequencies)) * (frequencies > 0)[:, None]
+    level = _highest_level(frequencies, lines)
+    if scene.tacton.rhythm:
+        table = lines_in_pulses(scene.pressure, response)
+        amplitudes = np.reshape([*table.amplitudes.values()], (-1, len(scene.probes)))
+        level = _highest_level([*table.frequencies.values()], amplitudes)
     return Solution(
         waveform=motion, lines=lines, rms=settled.std(axis=0),
-        level=_highest_level(frequencies, lines), map_rms=no_map, map_level=no_map,
+        level=level, map_rms=no_map, map_level=no_map,
     )  # fmt: skip
 
 
@@ -375,7 +393,7 @@ def _amplitudes_at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats
     return np.where(values > ROUND_OFF * values.max(initial=0.0), values, 0.0)
 
 
-def _highest_level(frequencies: Floats, amplitudes: Floats) -> Floats:
+def _highest_level(frequencies: ArrayLike, lines: Complex | Floats) -> Floats:
     """Return the highest sensation level (p,) in dB of lines (f, p)."""
-    levels = sensation_level(amplitudes, np.asarray(frequencies)[:, None])
+    levels = sensation_level(np.abs(lines), np.asarray(frequencies)[:, None])
     return np.asarray(np.maximum(levels.max(axis=0, initial=-np.inf), LOWEST_LEVEL))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import Effort, Response, named_lines, point_kernel, sensation_level
+from simple_model import Effort, Response, named_lines, point_kernel
 from simple_model.quantities import DISPLACEMENT, Quantity
 from skinwave.models.options import sample_times
 from skinwave.results.comparison import compare, moving_rms
@@ -62,10 +62,8 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
             "spread_6db_mm": 1e3 * agreement.spread_candidate[-6],
             "spread_20db_mm": 1e3 * agreement.spread_candidate[-20],
         }  # fmt: skip
-    levels = {}
-    if run.is_skin:
-        levels = {n: sensation_level(a, run.frequencies[n]) for n, a in run.lines.items()}
-    if levels and not run.unresolved:
+    levels = run.levels
+    if levels and not run.in_pulses.unresolved:
         row["level_db"] = np.max(list(levels.values()), axis=0)
         row["sensation_line"] = max(levels, key=lambda name: levels[name].max())
     kernel_lines = replace(run, response=kernel).lines if of_body else run.lines
@@ -77,7 +75,7 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
             with np.errstate(divide="ignore", invalid="ignore"):
                 row[f"{name}_ratio"] = abs(agreement.scale) * run.lines[name] / pressure
         row |= {f"{name}_{unit}": scale * run.lines[name]} if of_body else {}
-        row |= {f"{name}_db": levels[name]} if levels else {}
+        row |= {f"{name}_db": levels[name]} if name in levels else {}
     return plain(row)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from in_browser import needs_browser
 
-from simple_model import Rhythm
+from simple_model import Rhythm, sensation_level
+from simple_model.load.line_names import during_pulses
 from skinwave.live import elements
 from skinwave.live.elements import BAND, element_pack
 from skinwave.live.packs import pack_of
@@ -29,6 +30,10 @@ PLACES = """({ name, values, k }) => {
   const { re } = motion.onGrid(MAP_LINE, MAP_LINE);
   const at = motion.at(MAP_LINE[k % n], MAP_LINE[Math.floor(k / n)]).re;
   return [...motion.f].map((_, l) => [re[l * n * n + k], at[l]]);
+}"""
+LEVEL = """({ name, values }) => {
+  const motion = bodies[name].respond(loadOf(values));
+  return levelOf(motion.f, motion.at(values.x / 1e3, values.y / 1e3)).dB;
 }"""
 H = 0.012  # m: size of the palm's elements in this test
 
@@ -78,6 +83,11 @@ def test_lines_waveforms_and_maps_of_layers_and_sheets(page, name):
     rhythm = Rhythm(pulses=((0.03, 0.02), (0.02, 0.01)), ramp=0.01)
     pulsed = scenes(name, 1, rhythm=rhythm, duration=0.1)
     assert wave_errors(page, name, pulsed, waveform_of).max() < 0.02
+    level = page.evaluate(LEVEL, {"name": name, "values": control_values(pulsed[0], name)})
+    steady = [replace(each, pressure=during_pulses(each.pressure)) for each in pulsed]
+    f, exactly = lines_of(steady[0])
+    levels = sensation_level(np.abs(exactly[f > 0]), f[f > 0])
+    assert level == pytest.approx(levels.max(), abs=0.1)
     given = {"name": name, "values": control_values(made[0], name), "k": 45 * 19 + 28}
     pairs = np.array(page.evaluate(PLACES, given))
     assert np.abs(pairs[:, 0] - pairs[:, 1]).max() < 5e-3 * np.abs(pairs).max()

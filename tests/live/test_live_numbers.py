@@ -111,12 +111,12 @@ def test_the_kernel_in_time_and_on_a_map(page, starts):
         """([many, times]) => many.map((own) => {
           const known = loadOf(own), motion = respond(known);
           const paper = respond({ ...known, drive: "linear", profile: "main_lobe" });
-          const [map, other] = [motion, paper].map((each) => mapOf(each, known));
+          const [map, other] = [motion, paper].map((each) => mapOf(each));
           return { f: [...motion.f], map: [...map.rms], other: [...other.rms],
             levels: [...map.level],
             waveforms: [motion, paper].map((each) => [...each.waveform(0.008, -0.003, times)]),
-            at: [...amplitudesOf(motion.f, motion.at(0.008, -0.003))], mean: meanLevel(known),
-            level: levelOf(known, motion.f, motion.at(0.008, -0.003), "Pa"),
+            at: [...amplitudesOf(motion.f, motion.at(0.008, -0.003))],
+            level: levelOf(motion.f, motion.at(0.008, -0.003), "Pa"),
             share: shareOutside(map.rms, other.rms), reach: reach(known, map) };
         })""",
         [many, TIMES.tolist()],
@@ -135,7 +135,7 @@ def test_the_kernel_in_time_and_on_a_map(page, starts):
 
 
 def _check_map(scene, own, amplitudes):
-    levels = sensation_level(own["mean"] * np.array(amplitudes), own["f"], unit="Pa")
+    levels = sensation_level(amplitudes, own["f"], unit="Pa")
     if own["level"] is not None:
         assert own["level"]["dB"] == pytest.approx(levels.max(), abs=1e-6)
     rms, other, level = (np.reshape(own[k], (45, 45)) for k in ("map", "other", "levels"))
@@ -182,7 +182,7 @@ def test_the_highest_level_over_a_control_is_refined(page, starts):
             if (size > 50) throw new Error("off the body");
             const known = loadOf({ ...own, size });
             const motion = respond(known);
-            const level = levelOf(known, motion.f, motion.at(0.01, 0), "Pa");
+            const level = levelOf(motion.f, motion.at(0.01, 0), "Pa");
             return { kernel: level?.dB ?? NaN, waves: NaN };
           };
           const steps = [...levelOver(levelsAt, [2, 60], { lead: "kernel", count: 24 })];

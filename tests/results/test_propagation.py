@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simple_model import MovingPressure, Response, Tacton, Trajectory, phasors
+from simple_model import MovingPressure, Response, Rhythm, Tacton, Trajectory, phasors
 from simple_model.load.spectrum import load_lines, synthesise
+from skinwave.models.options import SolveOptions
 from skinwave.planning.simulate import compute, simulate
 from skinwave.results.claims import evaluate
 from skinwave.results.comparison import compare
@@ -20,6 +21,8 @@ from skinwave.scene.paper15 import beside_kernels, tactons
 from skinwave.scene.scene import BODIES, Body, Scene, with_body
 from skinwave.studies.first_screen import first_screen, quick_maps, with_kernels
 from skinwave.studies.pages import four_numbers, sentences
+from skinwave.sweeps.ensemble import method_of, solve_sample
+from skinwave.sweeps.measures import result_columns
 
 CIRCLE = Trajectory(shape="circle", size=0.02, speed=12.0)
 BOTH = Tacton(am_frequency=140, trajectory=CIRCLE, duration=0.5)
@@ -211,3 +214,36 @@ def _run(scene, model, name="one"):
 def _response(t, wave, quantity):
     motion, probes = wave[:, None] * np.array([1.0, 0.5]), np.array([[0, 0], [0.01, 0]])
     return Response(model="fem", times=t, probes=probes, values=motion, quantity=quantity)
+
+
+def test_levels_and_reach_are_those_while_a_pulse_is_on():
+    plain = Tacton(am_frequency=150, duration=0.16)
+    rhythm = Rhythm(pulses=((0.04, 0.02), (0.016, 0.044)), ramp=0.008)
+    probes, places = ((0.001, 0.0),), 0.005 * np.arange(-2.0, 3.0)
+    found = []
+    for tacton in (replace(plain, rhythm=rhythm), plain):
+        load = MovingPressure(tacton=tacton)
+        scene = Scene(pressure=load, body=Body(), probes=probes)
+        body, kernel = (
+            Run(tacton="", body=name, scene=scene, response=compute(scene, model))
+            for name, model in (("slab", "flat-body"), ("none", "point-kernel"))
+        )
+        maps = body_map(scene, places, places), kernel_map(load, places, places)
+        effect, row = propagation(body, kernel, *maps), result_columns(scene, body.response)
+        highest = effect.highest_sensation
+        method = method_of(scene, SolveOptions(model="flat-body"))
+        sample = solve_sample(scene, replace(method, mapped=False))
+        levels = [highest.level, row["level_db"][0], sample.level[0]]
+        found.append((highest.name, row["sensation_line"], effect.above_threshold, levels))
+    assert found[0][:3] == found[1][:3]
+    assert found[0][2][1].metre > 0
+    # The body settles in some milliseconds of 160: 0.14 dB.
+    np.testing.assert_allclose(found[0][3], found[1][3], atol=0.2)
+    np.testing.assert_allclose(found[0][3], found[0][3][0], atol=1e-6)
+
+
+def test_a_rhythm_alone_has_the_level_of_its_lines():
+    tacton = Tacton(duration=0.2, rhythm=Rhythm(pulses=((0.005, 0.005),)))
+    scene = Scene(pressure=MovingPressure(tacton=tacton), body=Body(), probes=((0.0, 0.0),))
+    run = Run(tacton="", body="slab", scene=scene, response=compute(scene, "flat-body"))
+    assert set(run.levels) == set(run.table.frequencies) > {"f_r"}

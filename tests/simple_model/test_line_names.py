@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 
 import simple_model
 from simple_model import MovingPressure, Rhythm, Tacton, line_table, named_lines, point_kernel
-from simple_model.line_table import FREE, UNNAMED, UNRESOLVED
+from simple_model.line_table import FREE, OF_LOAD, UNNAMED, UNRESOLVED
 from simple_model.load.line_names import SYMBOLS, line_frequency, line_name, line_names, symbols
 from simple_model.response import SETTLE, fit_lines
+from skinwave import Body, Scene
+from skinwave.planning.simulate import compute
 
 TIMES = np.arange(6000) / 6000
 PLACES = [[0.0, 0.0], [0.006, 0.0], [0.012, 0.002]]
@@ -157,6 +159,26 @@ def test_a_free_vibration_differs_from_a_line_of_the_load():
     assert set(table.frequencies) == {"f_AM", "2f_AM"}
     assert table.amplitudes["f_AM"][0] == pytest.approx(1e-6, rel=0.01)
     assert line_table(*struck(strength=3e-3)).unnamed == ()  # below -40 dB
+
+
+def test_lines_of_a_chirp_are_no_free_vibration():
+    t = np.arange(500) / 2000
+    chirp = simple_model.Signal(
+        rate=2000, samples=tuple(np.sin(2 * np.pi * (20 * t + 960 * t**2)).tolist())
+    )
+    scene = Scene(pressure=MovingPressure(tacton=Tacton(duration=0.25, signal=chirp)), body=Body())
+    for model in ("flat-body", "flat-body-harmonic"):
+        table = line_table(scene.pressure, compute(scene, model))
+        assert {peak.kind for peak in table.unnamed} == {OF_LOAD}
+
+
+def test_lines_of_a_rhythm_are_named_by_it():
+    rhythm = Rhythm(pulses=((0.1, 0.05), (0.04, 0.11)), ramp=0.02)
+    tacton = Tacton(am_frequency=60, duration=0.42, rhythm=rhythm)
+    scene = Scene(pressure=MovingPressure(tacton=tacton), body=Body())
+    table = line_table(scene.pressure, compute(scene, "flat-body-harmonic"))
+    assert {"f_AM", "f_AM-f_r", "f_AM+f_r", "2f_AM"} <= table.frequencies.keys()
+    assert {peak.kind for peak in table.unnamed} <= {OF_LOAD}
 
 
 def test_a_steady_peak_that_is_not_in_the_load_is_unnamed():

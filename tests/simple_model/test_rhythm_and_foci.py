@@ -10,6 +10,7 @@ from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, joi
 from simple_model.load.path_cells import path_fourier, path_samples
 from simple_model.load.spectrum import load_lines
 from skinwave import Body, Scene
+from skinwave.planning.plan_warnings import rhythm_unresolved
 from skinwave.planning.simulate import compute
 
 TIMES = np.arange(10_000) / 10_000
@@ -63,6 +64,44 @@ def test_pulses_make_lines_of_their_period():
     for n, name in ((1, "f_r"), (3, "3f_r")):
         assert found[name][0] == pytest.approx(2 / np.pi / n, rel=1e-2)
     assert found["2f_r"] < 1e-3
+
+
+def beaten(seconds, am=60.0, **more):
+    """Two pulses in 0.3 s."""
+    rhythm = Rhythm(pulses=((0.1, 0.05), (0.04, 0.11)), ramp=0.02)
+    return MovingPressure(tacton=Tacton(am_frequency=am, duration=seconds, rhythm=rhythm, **more))
+
+
+@pytest.mark.parametrize("seconds", [0.4, 0.6, 0.9])
+def test_a_line_is_that_of_one_period_of_the_rhythm(seconds):
+    t = np.arange(round(2000 * seconds)) / 2000
+    load = beaten(seconds)
+    response = point_kernel(load, [[0, 0]], t)
+    period = 2 * (np.exp(-2j * np.pi * 60 * t) @ np.diag(t < 0.3) @ response.values)[0] / 600
+    table = simple_model.line_table(load, response)
+    assert table.amplitudes["f_AM"][0] == pytest.approx(abs(period), rel=1e-4)
+    assert table.frequencies["f_AM+f_r"] == pytest.approx(60 + 1 / 0.3)
+    assert not table.unresolved
+    found = simple_model.lines(response, [60.0])[0]
+    assert found == pytest.approx(abs(period), rel=1e-4)
+
+
+@pytest.mark.parametrize(("seconds", "am"), [(0.35, 60.0), (0.2, 0.0), (0.6, 61.7)])
+def test_a_rhythm_too_short_to_resolve_is_said_with_a_cure_that_works(seconds, am):
+    scene = Scene(pressure=beaten(seconds, am), body=Body())
+    response = compute(scene, "point-kernel")
+    table = simple_model.line_table(scene.pressure, response)
+    assert table.unresolved or not table.frequencies
+    (warning,) = rhythm_unresolved(scene, response)
+    if "multiples" in warning:
+        multiple = round(am / float(warning.partition(" Hz")[0].split()[-1])) / 0.3
+        assert float(warning.split()[-3]) == 0.4
+        longer = replace(scene, pressure=beaten(0.4, multiple))
+    else:
+        longer = replace(scene, pressure=beaten(float(warning.split()[-1]), am))
+    response = compute(longer, "point-kernel")
+    assert rhythm_unresolved(longer, response) == ()
+    assert simple_model.line_table(longer.pressure, response).frequencies
 
 
 def together(paths, **more):

@@ -288,3 +288,14 @@ def test_changes_of_lines_in_decibel():
     before, after = (replace(first, values=a * loud, quantity="displacement") for a in (1.0, 2.0))
     changes = line_changes(SKIN, before, after)
     assert changes["f_AM"] == pytest.approx(6.02, abs=0.01)
+
+
+def test_the_level_of_the_published_kernel_ignores_gaps():
+    rhythm = simple_model.Rhythm(pulses=((0.04, 0.02), (0.016, 0.044)), ramp=0.008)
+    plain = Tacton(am_frequency=150, duration=0.16)
+    levels = []
+    for tacton in (replace(plain, rhythm=rhythm), plain):
+        pressure = simple_model.MovingPressure(tacton=tacton)
+        scene = skinwave.Scene(pressure=pressure, body=Body(), probes=((0.0, 0.0),))
+        levels.append(relax._level(scene, compute(scene, "point-kernel-published")))
+    assert levels[0] == pytest.approx(levels[1], abs=0.01)
