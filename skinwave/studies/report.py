@@ -60,10 +60,7 @@ SNAPSHOTS = (
     "behind it show the Mach angle asin(c/v). On a circle smaller than a wavelength, no clean cone "
     "forms."
 )
-MAP = (
-    "RMS of the quantity about its mean in the steady state. Dotted: path of the focus; white: "
-    f"{NEAR:g} dB re the largest."
-)
+MAP = f"Dotted: path of the focus; white: {NEAR:g} dB re the largest."
 
 
 def write_report(
@@ -169,10 +166,14 @@ def map_parts(album: Album, gallery: Gallery) -> list[Part]:
     for name, field in album.maps.items():
         if (scene := scenes[name]).reading.is_plain:
             continue
-        caption = f"{label(name)}: {' '.join(map_sentences(scene, field))} {MAP}"
+        caption = f"{label(name)}: {' '.join(map_sentences(scene, field))} {_map_caption(scene)}"
         figure = maps.surfaces_figure(scene, {name: field}, gallery.style)
         parts.append(gallery.figure(f"quantity-{folder_name(name)}", figure, caption))
     return [Section("Where the quantity is largest", parts)] if parts else []
+
+
+def _map_caption(scene: Scene) -> str:
+    return f"{maps.rms_text(scene.pressure)} {MAP}"
 
 
 def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
@@ -268,4 +269,6 @@ def write_map(folder: Path, scene: Scene, field: SurfaceField) -> None:
     surface.save(folder / "map.npz", field)
     figure = maps.surfaces_figure(scene, {scene.reading.words: field})
     title = f"{scene.name}: {scene.reading.words}"
-    Report(title, map_sentences(scene, field), [Picture(png(figure), MAP, "map")]).write(folder)
+    Report(
+        title, map_sentences(scene, field), [Picture(png(figure), _map_caption(scene), "map")]
+    ).write(folder)
