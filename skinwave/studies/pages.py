@@ -124,6 +124,7 @@ def page_of(
     notes: Sequence[Part] = (),
     seconds: float | None = None,
     progress: Progress = silent,
+    failures: Mapping[str, str] | None = None,
 ) -> Report:
     """Return the page of runs by Tacton.
 
@@ -135,6 +136,7 @@ def page_of(
     modelled : further parts of what was modelled
     command, notes : command that makes the page again, and notes on it
     seconds : duration of all runs, the sum of their efforts if not given
+    failures : reasons of parts that failed
     """
     runs = [run for group in groups.values() for run in group]
     is_single = len(groups) == 1
@@ -166,7 +168,8 @@ def page_of(
         parts.insert(0, four_numbers(first))
         if not is_single:
             verdict[0] = f"Tacton {first.kernel.tacton}, one of {len(groups)}. {verdict[0]}"
-    return Report(title, [" ".join(verdict)] if verdict else [], parts, efforts_of(runs), PICTURES)
+    shown = [" ".join(verdict)] if verdict else []
+    return Report(title, shown, parts, efforts_of(runs), PICTURES, failures or {})
 
 
 def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
