@@ -75,8 +75,10 @@ def page(results: list[Result], planned: int) -> Report:
         for topic, cases in TOPICS.items()
         if any(r.case in cases for r in results)
     ]
-    parts = [summary, *topics, SCOPE, spent]
-    return Report("Verification", [" ".join(verdict)], parts, failures=failures_of(results))
+    return Report(
+        "Verification", [" ".join(verdict)], [summary, *topics, SCOPE, spent],
+        failures=failures_of(results),
+    )  # fmt: skip
 
 
 def failures_of(results: Iterable[Result]) -> dict[str, str]:
