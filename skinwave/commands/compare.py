@@ -62,7 +62,6 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.studies.first_screen import first_name
     from skinwave.studies.study import own_scenes, paper_scenes, run_study
     from skinwave.system import document
-    from skinwave.system.failures import or_failed
 
     given = None if options.scene == PAPER else read(options.scene)
     bodies = _chosen_body(options)
@@ -80,9 +79,8 @@ def run(options: argparse.Namespace) -> int:
         out = f"{Path(options.scene).stem}-compared"
         inputs += [options.scene, given.body.file, options.measured or ""]
     with result_folder(options, out, inputs, given) as (folder, progress):
-        live, failures = None, dict[str, str]()
-        with or_failed(failures, LIVE):
-            live = comparison_page(scenes[first_name(scenes)].values())
+        failures: dict[str, str] = {}
+        live = comparison_page(scenes[first_name(scenes)].values(), failures)
         if live:
             (folder / LIVE).write_text(live, encoding="utf-8")
         outcome = run_study(

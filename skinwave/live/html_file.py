@@ -83,7 +83,7 @@ def data_of(
                 lowest = pack["lowest_height_mm"] / 1e3
                 tests += selftest(body, name, -(-TESTS // len(names)), lowest, pack["error"])
     if not records:
-        raise ValueError(failure_text(failures))
+        raise ValueError("; ".join(dict.fromkeys(failures.values())))
     known = {record["name"] for record in records}
     kept = [k for k, scene in enumerate(scenes) if names[scene.body] in known]
     scenes, own = [scenes[k] for k in kept], [own[k] for k in kept]
@@ -94,10 +94,18 @@ def data_of(
     }  # fmt: skip
 
 
-def comparison_page(scenes: Iterable[Scene]) -> str | None:
-    """Return the page of the scenes with quick packs that it can set, skin first, or None."""
+def comparison_page(scenes: Iterable[Scene], failures: dict[str, str]) -> str | None:
+    """Return the page of the scenes with quick packs that it can set, skin first, or None. Adds
+    bodies that fail to the failures.
+    """
     quick = sorted(filter(_is_quick, scenes), key=lambda scene: not scene.body.is_skin)
-    return page(data_of(quick, test=False)) if quick else None
+    if not quick:
+        return None
+    with or_failed(failures, "live page"):
+        data = data_of(quick, test=False)
+        failures |= {f"live page of {name}": why for name, why in data["failures"].items()}
+        return page(data)
+    return None
 
 
 def _distance(scene: Scene, probe: tuple[float, float]) -> float:

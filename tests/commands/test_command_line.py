@@ -80,14 +80,14 @@ def test_a_run_that_fails_is_named_first_and_the_others_are_compared(scene, monk
     monkeypatch.setattr(study, "slow_maps", Mock(side_effect=ArithmeticError("no solution")))
     monkeypatch.setattr(study, "_response", fails_on_paper)
     monkeypatch.setattr("skinwave.live.html_file.pack_of", Mock(side_effect=ValueError("no pack")))
-    scene.write_text(SMALL.partition("[body]")[0])
+    scene.write_text(SMALL.partition("[body]")[0] + '[body]\nkind = "none"\n')
     assert main(["compare", str(scene), "--out", "both", "--json"]) == 1
     first, *_ = (said := json.loads(capsys.readouterr().out))["sentences"]
     assert first.startswith("2 parts of this result failed: ")
     assert said["failures"]["short on paper-sheet"] == "no solution"
-    assert "no pack" in said["failures"]["live.html"]
+    assert said["failures"]["live page"] == "no pack"
     page = read_results.page(scene.parent / "both/index.html")
-    assert page.index(first) < page.index("lies outside the point kernel")
+    assert page.index(first) < page.index("rive law and focus")
     # Nothing is written of a comparison without a body.
     monkeypatch.setattr(study, "_response", Mock(side_effect=ArithmeticError("none")))
     assert main(["compare", str(scene), "--out", "none"]) == 2
