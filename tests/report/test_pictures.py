@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from io import BytesIO
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import Mock
 
 import numpy as np
@@ -33,7 +34,6 @@ from skinwave.results import exports, motion, playback, views
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Body, Scene
 from skinwave.studies import album, pages, report
-from skinwave.system.document import Picture
 
 ONLY = "point-kernel-published,point-kernel,skin-slab"
 ARTEFACTS = Path(__file__).parents[2] / ".ci" / "artefacts"
@@ -320,16 +320,14 @@ def test_a_report_is_drawn_again_without_a_model_or_gl(folder, tmp_path, monkeyp
     assert not (tmp_path / "flat/pictures/film.gif").exists()
 
 
-def test_a_film_that_fails_is_named_first(folder, tmp_path, monkeypatch):
-    blank = Picture(b"", "blank")
-    monkeypatch.setattr(report, "renderer", lambda: replace(NO_GL, is_available=True))
-    monkeypatch.setattr(render, "picture", lambda *given, **how: np.zeros((8, 8, 3), np.uint8))
-    monkeypatch.setattr(pages.Gallery, "figure", lambda *given: blank)
-    monkeypatch.setattr(report, "_film", Mock(side_effect=MemoryError("no memory")))
-    out = tmp_path / "without"
-    assert main(["report", str(folder), "--out", str(out), "--quiet"]) == 1
-    text = (out / "index.html").read_text()
-    assert text.index("1 part of this result failed: film") < text.index('class="contents"')
+def test_a_film_that_fails_is_left_out_by_name(monkeypatch):
+    view = SimpleNamespace(column="palm", quantity=DISPLACEMENT, peak=1.0, tets=())
+    monkeypatch.setattr(render, "scale_text", lambda view: "to scale")
+    monkeypatch.setattr(render, "picture", lambda *given: np.zeros((8, 8, 3), np.uint8))
+    monkeypatch.setattr(report, "_film", Mock(side_effect=ArithmeticError("no frames")))
+    gallery, failures = pages.Gallery(), {}
+    parts = report._spatial_parts(view, 0, [view], gallery, lambda *phase: None, failures)
+    assert (list(parts), failures) == (["side by side"], {"film": "no frames"})
 
 
 def test_a_crash_of_the_renderer_is_detected(monkeypatch):
