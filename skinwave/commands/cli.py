@@ -26,7 +26,9 @@ DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; return 0 on success, 1 if interrupted or if a check failed, 2 on bad input."""
+    """Run a command; return 0 on success, 1 if interrupted or if a check or a part of the result
+    failed, 2 on bad input.
+    """
     typed = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in typed
     try:

@@ -4,7 +4,7 @@ import argparse
 import json
 import sys
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -193,10 +193,26 @@ def result_folder(
             record.write(folder, record.command_entry(options), scene=scene)
 
 
-def closing(options: argparse.Namespace, sentences: list[str], **summary: Any) -> None:
-    """Print the sentences and the page of a result, or everything as JSON."""
+def closing(
+    options: argparse.Namespace, sentences: list[str], failures: Mapping[str, str] | None = None,
+    **summary: Any,
+) -> int:  # fmt: skip
+    """Print the sentences and the page of a result, or everything as JSON; failed parts come first.
+
+    Returns the exit code: 1 if a part failed.
+    """
+    sentences = with_failures(failures, sentences)
     summary = {"out": str(options.out), "sentences": sentences} | summary
+    summary["failures"] = dict(failures or {})
     summarise(options, summary, "\n".join([*sentences, f"open {options.out}/index.html"]))
+    return 1 if failures else 0
+
+
+def with_failures(failures: Mapping[str, str] | None, sentences: Iterable[str]) -> list[str]:
+    """Return sentences after one on the failures, if there are any."""
+    from skinwave.system.failures import failure_text
+
+    return [*filter(None, [failure_text(failures or {})]), *sentences]
 
 
 def summarise(options: argparse.Namespace, summary: dict[str, Any], text: str) -> None:

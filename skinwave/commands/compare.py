@@ -79,13 +79,14 @@ def run(options: argparse.Namespace) -> int:
         out = f"{Path(options.scene).stem}-compared"
         inputs += [options.scene, given.body.file, options.measured or ""]
     with result_folder(options, out, inputs, given) as (folder, progress):
-        live = comparison_page(scenes[first_name(scenes)].values())
+        failures: dict[str, str] = {}
+        live = comparison_page(scenes[first_name(scenes)].values(), failures)
         if live:
             (folder / LIVE).write_text(live, encoding="utf-8")
         outcome = run_study(
             scenes, folder, solving(options, progress, model=options.model), title=title,
             command=record.command_entry(options)["typed"], measured=measured,
-            more=[document.live_link(LIVE)] if live else [],
+            more=[document.live_link(LIVE)] if live else [], failures=failures,
         )  # fmt: skip
     warn(outcome.warnings)
     claims = outcome.assessed_claims
@@ -94,12 +95,13 @@ def run(options: argparse.Namespace) -> int:
         f"{outcome.runs} of {outcome.planned} runs in {outcome.seconds:.0f} s, {memory:.2f} GiB; "
         f"{held} of {len(claims)} claims hold"
     )
-    closing(
-        options, [*outcome.conclusions, sentence], runs=outcome.runs, planned=outcome.planned,
-        claims_held=held, claims_assessed=len(claims), warnings=outcome.warnings,
+    code = closing(
+        options, [*outcome.conclusions, sentence], outcome.failures, runs=outcome.runs,
+        planned=outcome.planned, claims_held=held, claims_assessed=len(claims),
+        warnings=outcome.warnings,
         seconds=round(outcome.seconds, 1), peak_memory_gib=round(memory, 2),
     )  # fmt: skip
-    return 0 if outcome.runs == outcome.planned else 1
+    return code if outcome.runs == outcome.planned else 1
 
 
 def _read_measurement(options: argparse.Namespace) -> "Measured | None":

@@ -87,8 +87,8 @@ def run(options: argparse.Namespace) -> int:
         write(folder, found)
     if not options.json and not options.quiet:
         warn(cautions(found))
-    closing(options, **summary(found))
-    return 0 if found.solution.converged else 1
+    code = closing(options, failures=found.solution.failures, **summary(found))
+    return code if found.solution.converged else 1
 
 
 def _inspect(options: argparse.Namespace) -> int:

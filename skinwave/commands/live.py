@@ -3,7 +3,13 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_output, add_scenes, progress_of, summarise
+from skinwave.commands.common import (
+    add_output,
+    add_scenes,
+    progress_of,
+    summarise,
+    with_failures,
+)
 
 OUT = Path("live.html")
 
@@ -33,5 +39,7 @@ def run(options: argparse.Namespace) -> int:
         size = file.write(page(data).encode())
     bodies = [record["title"] for record in data["bodies"]]
     summary = {"out": str(options.out), "bytes": size, "bodies": bodies}
-    summarise(options, summary, f"wrote {options.out} ({size / 1e6:.1f} MB): {', '.join(bodies)}")
-    return 0
+    wrote = f"wrote {options.out} ({size / 1e6:.1f} MB): {', '.join(bodies)}"
+    summary["failures"] = data["failures"]
+    summarise(options, summary, "\n".join(with_failures(data["failures"], [wrote])))
+    return 1 if data["failures"] else 0

@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.models.options import SolveOptions
     from skinwave.scene.file import read
     from skinwave.studies.assumptions import check_rate
-    from skinwave.studies.relax import hierarchy_of, sentence, write
+    from skinwave.studies.relax import hierarchy_of, sentence, unknown_text, write
     from skinwave.system import document
 
     h, rate = metre(options.h), 1e3 * options.update_rate
@@ -48,10 +48,9 @@ def run(options: argparse.Namespace) -> int:
         write(folder, found)
     warnings = document.worst_warnings(found.efforts)
     warn(warnings)
-    sentences = [sentence(effect) for effect in found.effects()]
-    failed = [f"'{step.name}' failed: {step.error}" for step in found.steps if step.error]
-    closing(options, [*sentences, *failed], failed=failed, warnings=warnings)
-    return 0
+    effects = found.effects()
+    sentences = [*filter(None, [unknown_text(found, effects)]), *map(sentence, effects)]
+    return closing(options, sentences, found.failures, warnings=warnings)
 
 
 def _paper_vs_skin(options: argparse.Namespace) -> int:
@@ -62,5 +61,4 @@ def _paper_vs_skin(options: argparse.Namespace) -> int:
     with result_folder(options, BOTH) as (folder, progress):
         found = paper_vs_skin(progress, h=metre(options.h))
         report(found).write(folder)
-    closing(options, [*sentences(found), *found.failed])
-    return 0
+    return closing(options, sentences(found), found.failures)

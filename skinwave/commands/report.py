@@ -15,6 +15,7 @@ from skinwave.commands.common import (
     solving,
     summarise,
     warn,
+    with_failures,
 )
 
 if TYPE_CHECKING:
@@ -102,16 +103,19 @@ def _page(options: argparse.Namespace) -> int:
         if options.out.is_symlink():
             raise ValueError(f"{options.out} is a link; remove it, or name a folder with --out")
     inputs = [source, scene.body.file if scene else ""]
+    failures: dict[str, str] = {}
     with result_folder(options, f"{source.stem}-report", inputs, scene) as (folder, progress):
         if scene is not None:
-            warn(write_album(folder, scene, solving(options, progress), beside=options.beside))
-        write_report(
+            warnings, failures = write_album(
+                folder, scene, solving(options, progress), beside=options.beside
+            )
+            warn(warnings)
+        failures = write_report(
             folder if scene else source, folder, chosen, progress, formats=options.format,
-            columns=options.only, command=command["typed"] if scene else "",
+            columns=options.only, command=command["typed"] if scene else "", failures=failures,
         )  # fmt: skip
         size = (folder / "index.html").stat().st_size / 1e6
-    closing(options, [f"page of {size:.1f} MB"], megabytes=round(size, 2))
-    return 0
+    return closing(options, [f"page of {size:.1f} MB"], failures, megabytes=round(size, 2))
 
 
 def _map(options: argparse.Namespace) -> int:
@@ -152,13 +156,15 @@ def _film(options: argparse.Namespace) -> int:
         output_path(out, overwrite=options.overwrite, inputs=[source]) as aside,
         progress_of(options) as progress,
     ):
-        views = _views(options, progress)
+        views, failures = _views(options, progress)
         camera = options.camera or "tilted"
         film(aside, views, style(options.style), progress, camera=camera)
     frames = len(views[0].times)
-    summary = {"out": str(out), "frames": frames, "period_ms": 1e3 * views[0].period}
-    summarise(options, summary, f"{frames} frames of {played_text(views[0])}; wrote {out}")
-    return 0
+    summary = {"out": str(out), "frames": frames, "period_ms": 1e3 * views[0].period,
+               "failures": failures}  # fmt: skip
+    text = f"{frames} frames of {played_text(views[0])}; wrote {out}"
+    summarise(options, summary, "\n".join(with_failures(failures, [text])))
+    return 1 if failures else 0
 
 
 def _scene(options: argparse.Namespace) -> "Scene":
@@ -169,24 +175,28 @@ def _scene(options: argparse.Namespace) -> "Scene":
     return scene if options.quantity is None else replace(scene, quantity=options.quantity)
 
 
-def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
-    """Return the saved motion of a result folder, or compute that of every model of a scene."""
+def _views(
+    options: argparse.Namespace, progress: "Progress"
+) -> "tuple[list[View], dict[str, str]]":
+    """Return the saved motion of a result folder, or compute that of every model of a scene; with
+    the models that failed.
+    """
     from skinwave.studies.album import open_album, quantity_views
 
     if not options.source.is_dir():
-        views, warnings = quantity_views(
+        views, warnings, failures = quantity_views(
             replace(_scene(options), depth=0.0),  # a film shows the surface
             solving(options, progress), frames=options.frames, beside=options.beside,
         )  # fmt: skip
         warn(warnings)
-        return views
+        return views, failures
     if options.quantity is not None:
         raise ValueError(
             f"{options.source} contains displacements only, not {options.quantity}; name its "
             "scene.toml instead"
         )
     if views := list(open_album(options.source).views.values()):
-        return views
+        return views, {}
     raise ValueError(
         f"{options.source} contains no motion of whole bodies; name its scene.toml, or a folder "
         "that skinwave report wrote"

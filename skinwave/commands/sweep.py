@@ -16,6 +16,7 @@ from skinwave.commands.common import (
     metre,
     progress_of,
     summarise,
+    with_failures,
 )
 from skinwave.system.plain_text import say
 
@@ -80,16 +81,17 @@ def run(options: argparse.Namespace) -> int:
     engine.check(options.scheduler)
     summary: dict[str, Any] = {}
     lines: list[str] = []
-    out, missing = options.scene, 0
+    out, missing, failures = options.scene, 0, dict[str, str]()
     if options.scene.is_dir():
         if options.vary or not (options.csv or options.plot is not None):
             raise ValueError(
                 f"{out} is a folder; add --plot or --csv and remove --vary, or name a scene file"
             )
         dataset.check_folder(out)
+        failures = dataset.failures_of(dataset.read(out))
     else:
         out = options.out or Path(f"{options.scene.stem}-sweep")
-        summary, lines = _sweep(options, out)
+        summary, lines, failures = _sweep(options, out)
         missing = summary["missing"]
     if missing < summary.get("planned", 1):
         if options.csv:
@@ -97,12 +99,15 @@ def run(options: argparse.Namespace) -> int:
         if options.plot is not None:
             summary["figures"] = _draw(options, out)
             lines += [f"wrote {path}" for path in summary["figures"]]
-    summarise(options, summary, "\n".join(lines))
-    return 1 if missing else 0
+    summary["failures"] = failures
+    summarise(options, summary, "\n".join(with_failures(failures, lines)))
+    return 1 if missing or failures else 0
 
 
-def _sweep(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list[str]]:
-    """Run the missing points of the design; return a summary and sentences."""
+def _sweep(
+    options: argparse.Namespace, out: Path
+) -> tuple[dict[str, Any], list[str], dict[str, str]]:
+    """Run the missing points of the design; return a summary, sentences and failures."""
     from skinwave.models.options import SolveOptions
     from skinwave.results import record
     from skinwave.scene.distributions import Spread
@@ -127,7 +132,7 @@ def _sweep(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
     points = cases(options.scene, combined)
-    optimum, files = None, list[str]()
+    optimum, files, failures = None, list[str](), dict[str, str]()
     with progress_of(options) as progress:
         sweep = Sweep(
             folder=out, points=partial(cases, options.scene), options=solving, progress=progress,
@@ -135,6 +140,8 @@ def _sweep(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list
             command=record.command_entry(options),
         )  # fmt: skip
         outcome = sweep.run(points)
+        if outcome.planned > outcome.missing:
+            failures |= dataset.failures_of(sweep.rows(points))
         if grid and not outcome.missing:
             optimum = best.find_best(sweep, grid, options.best, options.samples, options.seed)
     if has_page and not outcome.missing:
@@ -158,7 +165,9 @@ def _sweep(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list
     if optimum:
         summary["best"] = asdict(optimum) | {"is_at_end": optimum.is_at_end}
         lines.insert(0, optimum.words)
-    return summary, lines
+        if optimum.failed:
+            failures[f"{optimum.failed} samples"] = f"no number in column {optimum.column}"
+    return summary, lines, failures
 
 
 def _draw(options: argparse.Namespace, out: Path) -> list[str]:

@@ -50,17 +50,16 @@ def _cases(options: argparse.Namespace) -> int:
     cases = [each for each in suite.CASES.values() if not (options.quick and each.slow)]
     with result_folder(options, "verification") as (folder, progress):
         results = suite.run_suite(cases, folder, progress, debug=options.debug)
-    failed = [result.case.name for result in results if not result.passed]
+    failures = suite.failures_of(results)
     is_incomplete = len(results) < len(cases)
     sentences = [suite.summary(results)]
     if is_incomplete:
         sentences.append(f"interrupted after {len(results)} of {len(cases)} cases")
-    closing(
-        options, sentences, passed=len(results) - len(failed), failed=len(failed),
-        planned=len(cases), failures=failed,
-        seconds=round(sum(result.seconds for result in results), 1),
+    code = closing(
+        options, sentences, failures, passed=len(results) - len(failures), failed=len(failures),
+        planned=len(cases), seconds=round(sum(result.seconds for result in results), 1),
     )  # fmt: skip
-    return 1 if failed or is_incomplete else 0
+    return 1 if is_incomplete else code
 
 
 def _run_published(options: argparse.Namespace) -> int:
@@ -83,8 +82,7 @@ def _tradeoff(options: argparse.Namespace) -> int:
     with result_folder(options, name, inputs, scene) as (folder, progress):
         found = study(scene, progress)
         write(folder, scene, found)
-    closing(options, sentences(found), accepted=found.is_converged)
-    return 0
+    return closing(options, sentences(found), found.failures, accepted=found.is_converged)
 
 
 def _installation(options: argparse.Namespace) -> int:

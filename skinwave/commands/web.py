@@ -7,7 +7,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from skinwave.commands.common import add_reporting, add_scenes, progress_of
+from skinwave.commands.common import add_reporting, add_scenes, progress_of, warn, with_failures
 from skinwave.system.plain_text import say
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
@@ -38,6 +38,7 @@ def run(options: argparse.Namespace) -> int:
     scenes = [read_scene(path) for path in options.scenes]
     with progress_of(options) as progress:
         data = data_of(scenes, progress, bodies=QUICK, test=False)
+    warn(with_failures(data["failures"], []))
     with Server(data, options.port, base) as server, tempfile.TemporaryDirectory() as private:
         say(f"skinwave: {server.address} (press Ctrl-C to stop)", sys.stderr)
         has_display = sys.platform in ("win32", "darwin") or any(map(os.environ.get, DISPLAYS))

@@ -19,6 +19,7 @@ from skinwave.results.propagation import distance_from_path
 from skinwave.scene.paper15 import tactons
 from skinwave.scene.scene import BODIES, Body, Scene, body_name
 from skinwave.system.effort import Progress, silent
+from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.scripts import bundle, json_for_script
 from skinwave.system.templates import render
 
@@ -35,6 +36,7 @@ def page(data: Mapping[str, Any], title: str = TITLE) -> str:
         "live.html", title=title, script=script,
         css=(static / "page.css").read_text(encoding="utf-8"),
         data=json_for_script(data), policy=policy(script, served=bool(data.get("api"))),
+        failed=failure_text(data.get("failures", {})),
     )  # fmt: skip
 
 
@@ -57,8 +59,9 @@ def data_of(
     test: bool = True,
 ) -> dict[str, Any]:
     """Return the data of a page of scenes at their probes nearest to the path, or of preset bodies,
-    as a dict for JSON. `test` adds the data of the self-test. Raises ValueError if no control of
-    the page can set a scene.
+    as a dict for JSON. `test` adds the data of the self-test. A body that fails is left out, with
+    its reason in "failures". Raises ValueError if all fail, or if no control of the page can set a
+    scene.
     """
     scenes = [
         replace(scene, probes=tuple(sorted(scene.probes, key=partial(_distance, scene))))
@@ -66,34 +69,43 @@ def data_of(
     ]
     names = unique_names([scene.body for scene in scenes] or [BODIES[name] for name in bodies])
     own = [values.control_values(scene, names[scene.body]) for scene in scenes]
-    records, tests = [], []
+    records, tests, failures = [], [], dict[str, str]()
     for body, name in names.items():
         prefix = f"{title_of(body)}: " if len(names) > 1 else ""
 
         def on_body(phase: str, fraction: float, prefix: str = prefix) -> None:
             progress(f"{prefix}{phase}", fraction)
 
-        pack = pack_of(body, on_body)
-        records.append(record_of(body, pack, name))
-        if test:
-            lowest = pack["lowest_height_mm"] / 1e3
-            tests += selftest(body, name, -(-TESTS // len(names)), lowest, pack["error"])
+        with or_failed(failures, title_of(body)):
+            pack = pack_of(body, on_body)
+            records.append(record_of(body, pack, name))
+            if test:
+                lowest = pack["lowest_height_mm"] / 1e3
+                tests += selftest(body, name, -(-TESTS // len(names)), lowest, pack["error"])
+    if not records:
+        raise ValueError("; ".join(dict.fromkeys(failures.values())))
+    known = {record["name"] for record in records}
+    kept = [k for k, scene in enumerate(scenes) if names[scene.body] in known]
+    scenes, own = [scenes[k] for k in kept], [own[k] for k in kept]
     return {
         "bodies": records, "start": own[0] if own else {"body": records[0]["name"]},
         "presets": _own_presets(scenes, own) + values.presets(),
-        "selftest": tests, "api": None,
+        "selftest": tests, "api": None, "failures": failures,
     }  # fmt: skip
 
 
-def comparison_page(scenes: Iterable[Scene]) -> str | None:
-    """Return the page of the scenes with quick packs, skin first; None if there are none or it
-    fails.
+def comparison_page(scenes: Iterable[Scene], failures: dict[str, str]) -> str | None:
+    """Return the page of the scenes with quick packs that it can set, skin first, or None. Adds
+    bodies that fail to the failures.
     """
     quick = sorted(filter(_is_quick, scenes), key=lambda scene: not scene.body.is_skin)
-    try:
-        return page(data_of(quick, test=False)) if quick else None
-    except (ValueError, ArithmeticError):
+    if not quick:
         return None
+    with or_failed(failures, "live page"):
+        data = data_of(quick, test=False)
+        failures |= {f"live page of {name}": why for name, why in data["failures"].items()}
+        return page(data)
+    return None
 
 
 def _distance(scene: Scene, probe: tuple[float, float]) -> float:
@@ -102,7 +114,7 @@ def _distance(scene: Scene, probe: tuple[float, float]) -> float:
 
 def _is_quick(scene: Scene) -> bool:
     try:
-        return pack_method(scene.body) != "poles"
+        return pack_method(scene.body) != "poles" and bool(values.control_values(scene, ""))
     except ValueError:
         return False
 

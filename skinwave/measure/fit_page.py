@@ -88,6 +88,7 @@ def write(folder: Path, result: Fit) -> None:
         f"{result.target.scene.name} fitted to {result.measured.name or 'a measurement'}",
         verdict=[" ".join([*estimates, residual])], parts=[*parts[:1], contents(parts), *parts[1:]],
         efforts=[("", Effort(warnings=tuple(cautions(result))))],
+        failures=result.solution.failures,
     ).write(folder)  # fmt: skip
 
 

@@ -8,7 +8,7 @@ its range, and the search continues from the minima of the scan until none leads
 rough data if there are any; the best start continues with all data.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from skinwave.measure.alignment import AS_GOOD
 from skinwave.measure.observed import Data
 from skinwave.measure.parameters import DELAY, Parameters
 from skinwave.system.effort import Progress
+from skinwave.system.failures import failure_text, or_failed
 from skinwave.typing import Floats
 
 FORWARD_STEP, CENTRAL_STEP = 1e-5, 1e-3  # of differences, in the unit interval
@@ -92,6 +93,7 @@ class Solution:
     residual: Floats  # (n, s), weighted
     slopes: Floats  # (n s, k), derivatives of the residual
     starts: tuple[Start, ...]  # the best first
+    failures: Mapping[str, str]  # reasons of other starts
     may_be_flipped: bool  # whether the opposite sign of the measurement fits as well
     converged: bool
 
@@ -129,14 +131,18 @@ def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solut
         raise ValueError(f"{count} values cannot determine {k} parameters; vary fewer keys")
     hypercube = qmc.LatinHypercube(k, rng=seed)
     points = [hypercube.random(CANDIDATES) for _ in range(starts)]
-    ordered = sorted(search(problem.rough, points, progress), key=lambda start: start.cost)
+    failures: dict[str, str] = {}
+    found = search(problem.rough, points, progress, failures)
+    if not found:
+        raise ValueError(failure_text(failures))
+    ordered = sorted(found, key=lambda start: start.cost)
     progress("fit to all data", 0.0)
     best = refine(problem, ordered[0].ended, tolerance=FINE_TOLERANCE)
     progress("derivatives", 0.0)
     return Solution(
         problem=problem, u=best.ended,
         residual=problem.residual(best.ended).reshape(problem.data.values.shape),
-        slopes=problem.slopes(best.ended), starts=tuple(ordered),
+        slopes=problem.slopes(best.ended), starts=tuple(ordered), failures=failures,
         may_be_flipped=_may_be_flipped(problem.rough, ordered[0], points[0]),
         converged=best.converged,
     )  # fmt: skip
@@ -157,20 +163,23 @@ def _may_be_flipped(problem: Problem, best: Start, candidates: Floats) -> bool:
     return more < AS_GOOD * scale and is_better
 
 
-def search(problem: Problem, starts: Sequence[Floats], progress: Progress) -> list[Start]:
-    """Return the results of several starts, in order, each with candidates (c, k)."""
+def search(
+    problem: Problem, starts: Sequence[Floats], progress: Progress, failures: dict[str, str]
+) -> list[Start]:
+    """Return the results of starts that do not fail, in order, each with candidates (c, k)."""
     results: list[Start] = []
     minima: list[tuple[Start, Start]] = []  # each with the one that its scans lead to
     for n, candidates in enumerate(starts):
         progress("search from several starts", n / len(starts))
-        local = refine(problem, best_candidate(problem, candidates))
-        near = (end for start, end in minima
-                if np.abs(start.ended - local.ended).max() <= SAME_MINIMUM)  # fmt: skip
-        lowest = next(near, None)
-        if lowest is None:
-            lowest = descend(problem, local)
-            minima.append((local, lowest))
-        results.append(replace(lowest, begun=local.begun))
+        with or_failed(failures, f"start {n + 1}"):
+            local = refine(problem, best_candidate(problem, candidates))
+            near = (end for start, end in minima
+                    if np.abs(start.ended - local.ended).max() <= SAME_MINIMUM)  # fmt: skip
+            lowest = next(near, None)
+            if lowest is None:
+                lowest = descend(problem, local)
+                minima.append((local, lowest))
+            results.append(replace(lowest, begun=local.begun))
     return results
 
 

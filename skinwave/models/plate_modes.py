@@ -335,9 +335,9 @@ def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
     return float(relative_changes(stretching, linear + stretching).max())
 
 
-def steady_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
-    """Return the motion of a whole sheet about its mean in the later half of a scene: times (t,) in
-    s, coordinates (t, m) in kg^1/2 m of all modes, and the modes.
+def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
+    """Return the motion of a whole sheet from rest: times (t,) in s, coordinates (t, m) in kg^1/2 m
+    of all modes, and the modes.
     """
     times = sample_times(scene)
     options = SolveOptions(tolerance=tolerance)
@@ -345,12 +345,11 @@ def steady_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Plate
     linear = FROM_REST.solve(scene, times, options).values
     start = first_part(scene, times)
     found = _resolve(scene, start, options, modes, linear[: len(start)])
-    later = slice(len(times) // 2, None)
     middle = scene.body.placement.offset
-    z = linear_motion(modes, scene.pressure, scene.body.solid, times[later], middle=middle)
+    z = linear_motion(modes, scene.pressure, scene.body.solid, times, middle=middle)
     plate, stretching = _stretching_coordinates(scene, times, modes, found.count, found.parts)
-    z[:, plate.chosen] += stretching[:: found.parts][later]
-    return times[later], z - z.mean(axis=0), modes
+    z[:, plate.chosen] += stretching[:: found.parts]
+    return times, z, modes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

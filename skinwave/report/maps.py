@@ -10,6 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
 from fem.load_and_probe import facets_below
+from simple_model import MovingPressure
+from simple_model.load.path_cells import path_cells
 from simple_model.quantities import DISPLACEMENT, PRESSURE
 from skinwave.report.figures import REPORT, legend, panels, with_style
 from skinwave.report.palette import COLOURS, SEQUENTIAL, SIGNED, ink_colour, label
@@ -26,8 +28,8 @@ KERNEL, THRESHOLD = "#ff9e4a", "#ff2fd0"  # lines: the kernel's -20 dB, the dete
 MEASURED_EDGE = COLOURS["measured"]
 CONE = 25.0  # mm, length of the lines at the Mach angle
 CAPTION = (
-    "RMS of the steady vibration about its mean. Outside the dashed line the point kernel is below "
-    "a tenth of its largest value; the body moves there because waves propagate."
+    "Outside the dashed line the point kernel is below a tenth of its largest value; the body "
+    "moves there because waves propagate."
 )
 THRESHOLD_CAPTION = (
     "Inside the pink line the strongest component is above the detection threshold of skin."
@@ -37,6 +39,16 @@ MEASURED_CAPTION = (
     "displacement, without gain. An arrow on a colour bar means that a measured value is larger. "
     "On the kernel's map, a pressure, squares only show the places."
 )
+
+
+def rms_text(pressure: MovingPressure) -> str:
+    """Return the sentence on what a map under a load shows."""
+    if not path_cells(pressure).of_tacton:
+        return "RMS of the steady vibration about its mean."
+    return (
+        "RMS about the mean over the whole Tacton, as if it were repeated without a pause, because "
+        "the Tacton is too irregular for a steady vibration."
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from simple_model import Response, phasors
+from simple_model import MovingPressure, Response, phasors
+from simple_model.load.line_names import line_frequency
+from simple_model.load.path_cells import path_cells
 from simple_model.load.sampling import step
-from simple_model.response import SETTLE
+from simple_model.load.spectrum import load_lines
+from simple_model.response import SETTLE, is_separate, resolution
+from skinwave.results.run import ASSESSED
 from skinwave.system.drawing import call_report
-from skinwave.typing import Floats
+from skinwave.typing import Complex, Floats
 
 ROUND_OFF = 1e-6  # of the largest RMS motion: weaker lines are round-off
 LOWEST_PHASE_LEVEL = -20.0  # dB re a line's largest amplitude: below it a phase means little
@@ -35,7 +40,7 @@ class Agreement:
         where the line is strongest between -1/4 and 3/4 of a period, unwrapped outwards from there,
         and nan where either line is 20 dB below its largest
     spread_reference, spread_candidate : {-6: float, -20: float}, m, distance from the strongest
-        probe to the outermost one whose RMS motion is within 6 or 20 dB
+        probe to the outermost one whose steady RMS motion is within 6 or 20 dB
     frequencies : (f,) float, Hz
     probes : (p, 2) float, m
 
@@ -197,9 +202,11 @@ def _moving(response: Response) -> Floats:
     return np.asarray(steady - steady.mean(axis=0))
 
 
-def spread(response: Response) -> dict[int, float]:
-    """Return the distance in m from the strongest probe to the outermost within 6 and 20 dB."""
-    level = moving_rms(response)
+def spread(response: Response, other_lines: Sequence[float] = ()) -> dict[int, float]:
+    """Return the distance in m from the strongest probe to the outermost within 6 and 20 dB of its
+    `steady_rms`.
+    """
+    level = steady_rms(response, other_lines)
     strongest = int(np.argmax(level))
     distance = np.linalg.norm(response.probes - response.probes[strongest], axis=1)
     within = {drop: level >= level[strongest] * 10 ** (drop / 20) for drop in (-6, -20)}
@@ -209,3 +216,47 @@ def spread(response: Response) -> dict[int, float]:
 def moving_rms(response: Response) -> Floats:
     """Return the RMS (p,) about the mean, without the transient, in the unit of the response."""
     return np.asarray(_moving(response).std(axis=0))
+
+
+def steady_rms(response: Response, other_lines: Sequence[float] = ()) -> Floats:
+    """Return the RMS (p,) of `steady_lines` of the load and of `other_lines` in Hz; the
+    `moving_rms` if the load is unknown or has none within the response.
+    """
+    found = response.load and steady_lines(response, response.load, other_lines)
+    if not found or not len(found[0]):
+        return moving_rms(response)
+    return np.asarray(np.linalg.norm(found[1], axis=0) / np.sqrt(2))
+
+
+def steady_lines(
+    response: Response,
+    pressure: MovingPressure,
+    other_lines: Sequence[float] = (),
+    *,
+    weakest: float = 1e-3,
+    strong: float = 1e-2,
+) -> tuple[Floats, Complex] | None:
+    """Return frequencies (f,) in Hz and phasors (f, p) of the steady vibration under a pressure,
+    without the mean and without free vibration after the start.
+
+    They are lines of the load above a `weakest` fraction of its strongest line, lines that a
+    nonlinear body may add, and `other_lines` in Hz. Of lines too close to each other the strongest
+    is fitted. Returns None if the load has a rhythm or a signal, or if the response is too short to
+    resolve its `strong` lines: then there is no steady vibration within the response.
+    """
+    if path_cells(pressure).of_tacton:
+        return None
+    load = load_lines(pressure, weakest)
+    f, which = np.unique(np.round(load.frequencies, 9), return_inverse=True)
+    strengths = np.bincount(which, load.strengths) * (f > 0)
+    main, least = strengths > strong * strengths.max(), resolution(response, settle=0.0)
+    if not is_separate(f[main], strengths[main], least).all():
+        return None
+    added = [line_frequency(pressure.tacton, name) or 0.0 for name in ASSESSED]
+    chosen: list[float] = []
+    for each in (*other_lines, *f[np.argsort(-strengths, kind="stable")], *added):
+        is_apart = all(abs(each - other) >= least for other in chosen)
+        if is_apart and least <= each < 0.5 / step(response.times):
+            chosen.append(float(each))
+    # The window suppresses the start, where free vibration is strongest.
+    return np.array(chosen), phasors(response, chosen, settle=0.0)

@@ -7,7 +7,7 @@
 - Reach: largest distance from the path at which a component is above its threshold, likewise.
 - Phase delay: phase difference of motion and kernel pressure at one probe, over 2 pi f.
 
-All are of the steady vibration about its mean.
+All are of the steady vibration about its mean, without free vibration after the start.
 """
 
 from dataclasses import dataclass, replace

@@ -15,7 +15,7 @@ import numpy as np
 import fem
 from fem.load_and_probe import on_surface, surface_frame
 from meshes import reading
-from simple_model import MovingPressure, Statement, sensation_level
+from simple_model import MovingPressure, Response, Statement, sensation_level
 from simple_model.layers.flat_body import field_lines, steady_lines
 from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
@@ -26,11 +26,12 @@ from skinwave.models.flat_body import field_read
 from skinwave.models.limits import takes
 from skinwave.models.meshed import line_factor, probe_rows
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.plate_modes import FROM_REST, steady_motion
+from skinwave.models.plate_modes import FROM_REST, sheet_motion
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import read_at
 from skinwave.planning.errors import own_parts
 from skinwave.planning.left_out import stretches
+from skinwave.results.comparison import steady_lines as fitted_lines
 from skinwave.results.motion import REDUCTION_TOLERANCE, BodyMotion, reduced_motion
 from skinwave.scene.scene import Reading, Scene
 from skinwave.typing import Floats
@@ -150,10 +151,26 @@ def _plate_map(scene: Scene, x: Floats, y: Floats, model: str = "auto") -> Surfa
     is_linear = model != "auto" and not named(model).is_nonlinear
     if is_linear or not stretches(scene, MAP_TOLERANCE):
         return _field(scene, x, y, partial(plate_lines, places=places), "thin plate")
-    _, z, modes = steady_motion(scene, MAP_TOLERANCE)
-    shapes, covariance = modes.at(places - scene.body.placement.offset), np.cov(z, rowvar=False)
-    rms = np.sqrt(np.einsum("pi,ij,pj->p", shapes, covariance, shapes, optimize=True))
-    return SurfaceField(x=x, y=y, rms=rms.reshape(len(y), len(x)), note="stretching plate")
+    lines, note = stretching_lines(scene, MAP_TOLERANCE)
+    return _field(scene, x, y, lambda _: lines(places), note)
+
+
+def stretching_lines(scene: Scene, tolerance: float) -> tuple[LinesAt, str]:
+    """Return the function that computes lines of a sheet at large deflection, and what they are.
+
+    Without a steady vibration within the Tacton, they are those of its whole motion from rest.
+    """
+    times, z, modes = sheet_motion(scene, tolerance)
+    coordinates = Response(model="", times=times, probes=np.zeros((z.shape[1], 2)), values=z)
+    found, note = fitted_lines(coordinates, scene.pressure), "stretching plate"
+    if found is None:
+        a = 2 * np.fft.rfft(z, axis=0)[1:] / len(z)
+        size = np.linalg.norm(a, axis=1)
+        shown = size > NEGLIGIBLE_LINE_RATIO * size.max(initial=0.0)
+        found = (1 + np.flatnonzero(shown)) / (len(z) * times[1]), a[shown]
+        note += " from rest, with free vibration"
+    f, amplitudes = found
+    return lambda places: (f, amplitudes @ modes.at(places - scene.body.placement.offset).T), note
 
 
 def quantity_map(

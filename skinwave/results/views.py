@@ -19,13 +19,13 @@ from meshes.tetmesh import boundary_facets
 from simple_model.load.spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity, quantity
 from skinwave.models.limits import takes
-from skinwave.models.plate_modes import FROM_REST, STRETCHED, steady_motion
+from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import oscillating, read_at
 from skinwave.results.motion import BodyMotion, Shade, Tensors, shade, tensors, vibration
 from skinwave.results.playback import played_part
 from skinwave.results.run import Run
-from skinwave.results.surface import Lines, LinesAt, surface_lines
+from skinwave.results.surface import LinesAt, stretching_lines, surface_lines
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Scene
 from skinwave.system.json_kinds import fitting
@@ -174,19 +174,17 @@ def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int]) -> View:
 def flat_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
     """Return the view of a thin plate, or of a laterally infinite body on a flat rectangle.
 
-    At large deflection it shows the later half of the scene. `reach` and `part` are those of
-    `kernel_view`.
+    `reach` and `part` are those of `kernel_view`.
     """
-    scene, body, motion_at = run.scene, run.scene.body, None
-    lines_at = surface_lines(scene)
+    scene, body = run.scene, run.scene.body
     if scene.reading.is_plain and takes(FROM_REST, scene):
         points, triangles = _grid(np.array([body.width, body.height]) / 2, LAYER_GRID)
         points[:, :2] += body.placement.offset
-        if run.model == STRETCHED.name:
-            lines_at, motion_at = _large_motion(scene, lines_at, np.array(body.placement.offset))
     else:
         points, triangles = _grid(reach, LAYER_GRID)
-    return _flat_view(scene, run.body, run.model, part, (points, triangles), lines_at, motion_at)
+    is_large = run.model == STRETCHED.name
+    lines_at = stretching_lines(scene, PLATE_TOLERANCE)[0] if is_large else surface_lines(scene)
+    return _flat_view(scene, run.body, run.model, part, (points, triangles), lines_at)
 
 
 def _speed(scene: Scene, tone: float) -> float | None:
@@ -201,25 +199,6 @@ def _strongest_tone(frequencies: Floats, amplitudes: Floats) -> float:
     if not len(frequencies):
         return 0.0
     return float(frequencies[np.argmax((amplitudes**2).sum(axis=1))])
-
-
-def _large_motion(scene: Scene, linear: LinesAt, middle: Floats) -> tuple[LinesAt, MotionAt]:
-    """Return lines and motion of a sheet at large deflection in the later half of the scene."""
-    from scipy.interpolate import CubicSpline  # slow to import
-
-    at, z, modes = steady_motion(scene, PLATE_TOLERANCE)
-    steady = CubicSpline(at - at[0], z)
-    f = linear(middle[None])[0]
-    window = np.hanning(len(at))
-    coordinates = 2 / window.sum() * (np.exp(-2j * np.pi * np.multiply.outer(f, at)) * window) @ z
-
-    def lines_at(places: Floats) -> Lines:
-        return f, (coordinates @ modes.at(places - middle).T)
-
-    def motion_at(places: Floats, t: Floats) -> Floats:
-        return np.asarray(steady(np.mod(t, at[-1] - at[0])) @ modes.at(places - middle).T)
-
-    return lines_at, motion_at
 
 
 def _flat_view(

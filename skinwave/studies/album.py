@@ -56,6 +56,7 @@ from skinwave.scene import paper15
 from skinwave.scene.file import dumps, read
 from skinwave.scene.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.system.document import worst_warnings
+from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.json_kinds import EFFORT, PLAN, effort_of, fitting
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
@@ -110,15 +111,18 @@ def scene_columns(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
 def write_album(
     folder: Path, scene: Scene, options: SolveOptions, *, frames: int | None = None,
     beside: Sequence[str] = (),
-) -> list[str]:  # fmt: skip
-    """Compute a scene by every model, write the results into a folder, and return the warnings.
+) -> tuple[list[str], dict[str, str]]:  # fmt: skip
+    """Compute a scene by every model, and write the results into a folder. Return the warnings, and
+    the reasons of bodies and maps that failed.
 
-    Raises a ValueError if a model cannot compute the scene.
+    Raises a ValueError if a model cannot compute the scene, or if every body fails.
     """
+    failures: dict[str, str] = {}
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     runs, own, misfit = [], None, {}
-    for view, run, planned in compute_views(scene, options, frames=frames, beside=beside):
-        write_run(folder / run.column, run, also=partial(write_view, view) if view else None)
+    for view, run, planned in compute_views(scene, options, failures, frames=frames, beside=beside):
+        write = partial(write_view, view, failures=failures) if view else None
+        write_run(folder / run.column, run, also=write)
         runs.append(run)
         if run.scene == scene and planned:
             own = planned
@@ -127,25 +131,28 @@ def write_album(
     own = own or plan(scene, SolveOptions(tolerance=PLANNED))
     table = own.table() | {"tolerance": PLANNED} | misfit
     (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
-    return worst_warnings((run.body, run.response.effort) for run in runs)
+    return worst_warnings((run.body, run.response.effort) for run in runs), failures
 
 
-def write_view(view: View, folder: Path) -> None:
-    """Write a view and, for a body, the map of the probes' quantity."""
+def write_view(view: View, folder: Path, failures: dict[str, str]) -> None:
+    """Write a view and, for a body, the map of the probes' quantity unless it fails."""
     save(folder / "view.npz", view)
     scene, moved, (x, y) = view.scene, view.moved, grid(view.scene)
-    if moved and not (scene.reading.is_plain and has_wavenumber_integral(scene)):
-        surface.save(folder / "map.npz", element_map(scene, moved, x, y))
-    elif scene.reading.is_plain and view.body != "none":
-        surface.save(folder / "map.npz", body_map(scene, x, y))
+    with or_failed(failures, f"map of {view.column}"):
+        if moved and not (scene.reading.is_plain and has_wavenumber_integral(scene)):
+            surface.save(folder / "map.npz", element_map(scene, moved, x, y))
+        elif scene.reading.is_plain and view.body != "none":
+            surface.save(folder / "map.npz", body_map(scene, x, y))
 
 
 def compute_views(
-    scene: Scene, options: SolveOptions, *, frames: int | None = None, beside: Sequence[str] = ()
-) -> Iterator[tuple[View | None, Run, Plan | None]]:
+    scene: Scene, options: SolveOptions, failures: dict[str, str], *, frames: int | None = None,
+    beside: Sequence[str] = (),
+) -> Iterator[tuple[View | None, Run, Plan | None]]:  # fmt: skip
     """Yield view, run and plan of each of `scene_columns`; the published kernel has no view.
 
-    Views use larger elements than responses, or modes of a plate.
+    Views use larger elements than responses, or modes of a plate. Reasons of bodies without a
+    response, and of missing views, are added to the failures; raises a ValueError if all fail.
     """
     columns, progress = scene_columns(scene, beside), options.progress
     solving = replace(options, tolerance=PLANNED)
@@ -153,17 +160,15 @@ def compute_views(
         column: plan(each, solving)
         for column, each in columns.items() if each.body.of_kind.discretise
     }  # fmt: skip
-    moved = {
-        column: whole_motion(
-            each,
-            replace(
-                options, tolerance=REDUCTION_TOLERANCE,
-                h=options.h or LARGER * default_size(each.body),
-            ),
-        )
-        for column, each in columns.items()
-        if _has_elements(each, options.h)
-    }  # fmt: skip
+    meshed = [column for column, each in columns.items() if _has_elements(each, options.h)]
+    moved: dict[str, BodyMotion] = {}
+    for column in meshed:
+        each, pictured = columns[column], f"pictures of {column}"
+        size = options.h or LARGER * default_size(each.body)
+        with or_failed(failures, pictured):
+            moved[column] = whole_motion(
+                each, replace(options, tolerance=REDUCTION_TOLERANCE, h=size)
+            )
     tones = max(repetition_frequencies(scene.tacton).values(), default=0.0)
     fastest = max(map(fastest_line, moved.values()), default=tones)
     part = played_part(scene.pressure, fastest, frames)  # all views play the same part
@@ -174,14 +179,23 @@ def compute_views(
             is_shown = column == SAME_LOAD.name
             yield kernel_view(each, KERNEL_REACH, part) if is_shown else None, run, None
             continue
-        response = solve(each, plans[column])
-        run = Run(tacton=scene.name, body=column, scene=each, response=response)
-        progress(f"pictures of {column}", 0.0)
-        if column in moved:
-            view = body_view(each, column, moved[column], part)
-        else:
-            view = flat_view(run, KERNEL_REACH, part)
-        yield view, run, plans[column]
+        own: Run | None = None
+        with or_failed(failures, f"response of {column}"):
+            response = solve(each, plans[column])
+            own = Run(tacton=scene.name, body=column, scene=each, response=response)
+        if own is None:
+            continue
+        progress(pictured := f"pictures of {column}", 0.0)
+        view = None
+        if pictured not in failures:
+            with or_failed(failures, pictured):
+                view = (
+                    body_view(each, column, moved[column], part) if column in moved
+                    else flat_view(own, KERNEL_REACH, part)
+                )  # fmt: skip
+        yield view, own, plans[column]
+    if plans and all(f"response of {column}" in failures for column in plans):
+        raise ValueError(failure_text(failures))
 
 
 def _has_elements(scene: Scene, h: float | None) -> bool:
@@ -206,23 +220,27 @@ def _has_elements(scene: Scene, h: float | None) -> bool:
 
 def quantity_views(
     scene: Scene, options: SolveOptions, *, frames: int | None = None, beside: Sequence[str] = ()
-) -> tuple[list[View], list[str]]:
-    """Return views of a scene coloured by the probes' quantity, and warnings.
+) -> tuple[list[View], list[str], dict[str, str]]:
+    """Return views of a scene coloured by the probes' quantity, warnings, and failures.
 
     The point kernel is included only for displacement. Raises the errors of `write_album`.
     """
-    computed = [
-        (view, run)
-        for view, run, _ in compute_views(scene, options, frames=frames, beside=beside) if view
-    ]  # fmt: skip
+    failures: dict[str, str] = {}
+    found = compute_views(scene, options, failures, frames=frames, beside=beside)
+    computed = [(view, run) for view, run, _ in found if view]
     warnings = worst_warnings((run.body, run.response.effort) for _, run in computed)
     if scene.reading.record is DISPLACEMENT:
-        return [view for view, _ in computed], warnings
+        return [view for view, _ in computed], warnings, failures
     missing = description.no_kernel_text(scene)
-    views = [with_shade(view, run.scene) for view, run in computed if len(view.tets)]
+    views = []
+    for view, run in computed:
+        with or_failed(failures, f"{scene.quantity} of {view.column}"):
+            views += [with_shade(view, run.scene)] if len(view.tets) else []
+    if not views and failures:
+        raise ValueError(failure_text(failures))
     if not views:
         raise ValueError(f"{missing}. Give the scene a body")
-    return views, [*warnings, missing]
+    return views, [*warnings, missing], failures
 
 
 def _misfit(run: Run, moved: BodyMotion) -> float:

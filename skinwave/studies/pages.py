@@ -15,13 +15,20 @@ from PIL import Image as Pillow
 from PIL import features
 
 from simple_model import Effort
+from simple_model.line_table import FREE
 from simple_model.numbers import interval, percent, significant
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.models import named
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report import description
 from skinwave.report.figures import REPORT, figure_file
-from skinwave.report.maps import CAPTION, MEASURED_CAPTION, THRESHOLD_CAPTION, surfaces_figure
+from skinwave.report.maps import (
+    CAPTION,
+    MEASURED_CAPTION,
+    THRESHOLD_CAPTION,
+    rms_text,
+    surfaces_figure,
+)
 from skinwave.report.palette import label
 from skinwave.report.spectra import levels_figure, strongest_probe, tacton_figure
 from skinwave.report.styles import Style
@@ -117,6 +124,7 @@ def page_of(
     notes: Sequence[Part] = (),
     seconds: float | None = None,
     progress: Progress = silent,
+    failures: Mapping[str, str] | None = None,
 ) -> Report:
     """Return the page of runs by Tacton.
 
@@ -128,6 +136,7 @@ def page_of(
     modelled : further parts of what was modelled
     command, notes : command that makes the page again, and notes on it
     seconds : duration of all runs, the sum of their efforts if not given
+    failures : reasons of parts that failed
     """
     runs = [run for group in groups.values() for run in group]
     is_single = len(groups) == 1
@@ -159,7 +168,8 @@ def page_of(
         parts.insert(0, four_numbers(first))
         if not is_single:
             verdict[0] = f"Tacton {first.kernel.tacton}, one of {len(groups)}. {verdict[0]}"
-    return Report(title, [" ".join(verdict)] if verdict else [], parts, efforts_of(runs), PICTURES)
+    shown = [" ".join(verdict)] if verdict else []
+    return Report(title, shown, parts, efforts_of(runs), PICTURES, failures or {})
 
 
 def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
@@ -229,9 +239,26 @@ def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
             first.kernel.scene, first.maps, gallery.style, measured=first.measured
         )
         has_level = any(surface.level is not None for surface in first.maps.values())
-        captions = [CAPTION, THRESHOLD_CAPTION * has_level, MEASURED_CAPTION * bool(first.measured)]
+        captions = [
+            rms_text(first.kernel.scene.pressure), _free_vibration(first.bodies), CAPTION,
+            THRESHOLD_CAPTION * has_level, MEASURED_CAPTION * bool(first.measured),
+        ]  # fmt: skip
         parts.append(gallery.figure("propagation", figure, " ".join(filter(None, captions))))
     return [*parts, _uncertainty(first)]
+
+
+def _free_vibration(runs: Iterable[Run]) -> str:
+    """Return a sentence on the strongest free vibration of each body, which maps leave out."""
+    strongest = {}
+    for run in runs:
+        if free := [peak for peak in run.unnamed if peak.kind == FREE]:
+            strongest[run] = max(free, key=lambda peak: float(peak.amplitudes.max()))
+    each = ", ".join(
+        f"{label(run.column)} {run.response.record.text(float(peak.amplitudes.max()), 2)} at "
+        f"{peak.frequency:.0f} Hz"
+        for run, peak in strongest.items()
+    )
+    return f"Free vibration after the start is not included; at the probes: {each}." if each else ""
 
 
 def sentences(first: FirstScreen) -> list[str]:

@@ -7,7 +7,7 @@ load keeps its ratio to f_AM when the drive is reduced, a line of the sheet does
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -25,6 +25,7 @@ from skinwave.scene.paper15 import MEASURED_ON, tactons
 from skinwave.scene.scene import BODIES, STILL, Body, Scene
 from skinwave.system.document import Details, Picture, Report
 from skinwave.system.effort import Progress
+from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
@@ -49,12 +50,12 @@ LOADS: Mapping[str, Callable[[Floats], Floats]] = {
 @dataclass(frozen=True, kw_only=True)
 class Findings:
     """Levels in dB re the strongest line of a run, by (Tacton, line) and mechanism; ratios of 2
-    f_AM to f_AM at `AMPLITUDES`, by mechanism; and a sentence for each failed run.
+    f_AM to f_AM at `AMPLITUDES`, by mechanism; and reasons of failed runs.
     """
 
     levels: Mapping[tuple[str, str], Mapping[str, float]]
     ratios: Mapping[str, tuple[float, ...]]
-    failed: tuple[str, ...] = ()
+    failures: Mapping[str, str] = field(default_factory=dict)
 
 
 def paper_vs_skin(
@@ -72,22 +73,24 @@ def paper_vs_skin(
     still = Tacton(am_frequency=AM, duration=DURATION, trajectory=Trajectory())
     levels: dict[tuple[str, str], dict[str, float]] = {}
     ratios: dict[str, tuple[float, ...]] = {}
-    failed = []
+    failures: dict[str, str] = {}
     for body_name, body in bodies.items():
-        for cause, settled in _mechanisms(body, h, progress).items():
+        mechanisms: Mapping[str, Settled] = {}
+        with or_failed(failures, label(body_name)):
+            mechanisms = _mechanisms(body, h, progress)
+        for cause, settled in mechanisms.items():
             mechanism = f"{label(body_name)}: {cause}"
             for k, (name, tacton) in enumerate(chosen):
                 progress(mechanism, k / (len(chosen) + 1))
-                try:
-                    lines_of = _levels(*settled(tacton))
-                except ArithmeticError as error:
-                    failed.append(f"{name} on {mechanism}: {error}")
-                    continue
-                for line, level in lines_of.items():
-                    levels.setdefault((name, line), {})[mechanism] = level
+                with or_failed(failures, f"{name} on {mechanism}"):
+                    for line, level in _levels(*settled(tacton)).items():
+                        levels.setdefault((name, line), {})[mechanism] = level
             scaled = (replace(still, amplitude=amplitude) for amplitude in AMPLITUDES)
-            ratios[mechanism] = tuple(_ratio(settled(tacton)[1]) for tacton in scaled)
-    return Findings(levels=levels, ratios=ratios, failed=tuple(failed))
+            with or_failed(failures, f"ratios of {mechanism}"):
+                ratios[mechanism] = tuple(_ratio(settled(tacton)[1]) for tacton in scaled)
+    if not levels:
+        raise ValueError(failure_text(failures))
+    return Findings(levels=levels, ratios=ratios, failures=failures)
 
 
 Settled = Callable[[Tacton], tuple[MovingPressure, Response]]
@@ -198,12 +201,13 @@ def report(findings: Findings) -> Report:
         title="Paper and skin: which mechanism causes which line",
         verdict=conclusions[-2:],
         parts=[
-            *conclusions[:-2], *(f"Failed: {each}." for each in findings.failed),
+            *conclusions[:-2],
             Picture(png(ratio_figure(findings), dpi=130), caption, name="amplitude"),
             Details("2 f_AM over f_AM by amplitude", [ratios]),
             Details("Lines by mechanism", [levels]),
             Details("Patterns of loads", [patterns]),
         ],
+        failures=findings.failures,
     )  # fmt: skip
 
 

@@ -10,7 +10,6 @@ import os
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -48,6 +47,7 @@ from skinwave.studies.assumptions import (
 )
 from skinwave.system.document import Details, Part, Picture, Report, warnings_banner
 from skinwave.system.effort import Progress, peak_memory
+from skinwave.system.failures import REASONS, failure_text, reason
 from skinwave.system.processes import pool
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
@@ -141,6 +141,11 @@ class Hierarchy:
         """Effort of each response by step."""
         return [(step.name, step.response.effort) for step in self.every if step.response]
 
+    @property
+    def failures(self) -> dict[str, str]:
+        """Reason of failure of each step without a response."""
+        return {step.name: step.error for step in self.every if step.error}
+
     def pairs(self) -> list[tuple[HierarchyStep, HierarchyStep]]:
         """Return pairs of computed steps that differ by one assumption."""
         pairs = [(a, b) for a, b in pairwise(self.steps) if a.response and b.response]
@@ -204,8 +209,8 @@ def hierarchy_of(
                 step = replace(step, model=model, body=changed.body)
                 is_reduced = named(model).is_reduced
                 size = h or LARGER * default_size(scene.body) if is_reduced else h
-            except (ValueError, ArithmeticError) as error:
-                steps.append(replace(step, error=str(error)))
+            except REASONS as error:
+                steps.append(replace(step, error=reason(error)))
                 submitted.append(None)
                 continue
             coarse_first = is_reduced and name == ALMOST_UNDAMPED
@@ -217,10 +222,13 @@ def hierarchy_of(
             if future:
                 steps[k] = _compute(steps[k], future, steps[:k])
     first, second = len(up), len(up) + len(side)
-    return Hierarchy(
+    found = Hierarchy(
         scene=scene, steps=tuple(steps[:first]), side_steps=tuple(steps[first:second]),
         leave_one_out=tuple(steps[second:]),
     )  # fmt: skip
+    if not found.efforts:
+        raise ValueError(failure_text(found.failures))
+    return found
 
 
 def _time(
@@ -256,8 +264,8 @@ def _compute(
     """
     try:
         response, seconds, memory = future.result()
-    except (ValueError, ArithmeticError, MemoryError, OSError, BrokenProcessPool) as error:
-        return replace(step, error=str(error))
+    except REASONS as error:
+        return replace(step, error=reason(error))
     same = (s for s in before if s.response and (s.body, s.model) == (step.body, step.model))
     if (first := next(same, None)) and first.response:
         spent = first.response.effort.seconds.items()
@@ -335,6 +343,13 @@ def line_changes(
     return changes
 
 
+def unknown_text(hierarchy: Hierarchy, effects: Sequence[Effect]) -> str:
+    """Return a sentence on the assumptions that cannot be ranked; "" if all are."""
+    dropped = (step.name for step in (*hierarchy.steps[1:], *hierarchy.side_steps))
+    unknown = [f"'{name}'" for name in dropped if name not in {e.name for e in effects}]
+    return f"Not compared, because steps failed: {', '.join(unknown)}." * bool(unknown)
+
+
 def sentence(e: Effect) -> str:
     """Return sentences on the effect and the cost of dropping an assumption."""
     return f"Without the assumption '{e.name}', {_change_text(e)}"
@@ -374,9 +389,10 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
     np.savez(folder / "responses.npz", **arrays)  # type: ignore[arg-type]
     verdict = "No two steps can be compared, because too many failed."
     if effects:
-        verdict = (
-            f"The assumption with the largest effect is '{effects[0].name}': without it, "
-            f"{_change_text(effects[0])}"
+        unknown = unknown_text(hierarchy, effects)
+        verdict = f"{unknown} Of the others, " if unknown else "Of the assumptions, "
+        verdict += (
+            f"'{effects[0].name}' has the largest effect: without it, {_change_text(effects[0])}"
         )
     (folder / "effects.csv").write_bytes(Table(EFFECT_COLUMNS, map(_effect_row, effects)).to_csv())
     steps = Table(STEP_COLUMNS, map(_step_row, hierarchy.every), "steps")
@@ -389,7 +405,7 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
     ]  # fmt: skip
     richest = [effort for effort in hierarchy.efforts if effort[0] == hierarchy.steps[-1].name]
     title = f"{hierarchy.scene.name}: assumptions, one by one"
-    Report(title, [verdict], parts, richest).write(folder)
+    Report(title, [verdict], parts, richest, failures=hierarchy.failures).write(folder)
 
 
 def _figure(effects: list[Effect]) -> Figure:

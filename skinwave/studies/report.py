@@ -1,7 +1,7 @@
 """The report of a scene, one page with its pictures and data, and the page of a map."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from math import isfinite
@@ -36,6 +36,7 @@ from skinwave.studies.first_screen import Maps, first_screen, with_kernels
 from skinwave.studies.pages import Gallery, page_of
 from skinwave.system.document import Choice, Details, Part, Picture, Report, Section, inner_page
 from skinwave.system.effort import Progress
+from skinwave.system.failures import or_failed
 from skinwave.system.table import Table
 
 FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
@@ -60,10 +61,7 @@ SNAPSHOTS = (
     "behind it show the Mach angle asin(c/v). On a circle smaller than a wavelength, no clean cone "
     "forms."
 )
-MAP = (
-    "RMS of the quantity about its mean in the steady state. Dotted: path of the focus; white: "
-    f"{NEAR:g} dB re the largest."
-)
+MAP = f"Dotted: path of the focus; white: {NEAR:g} dB re the largest."
 
 
 def write_report(
@@ -75,15 +73,18 @@ def write_report(
     formats: Sequence[str] = (),
     columns: Sequence[str] = (),
     command: str = "",
-) -> None:
+    failures: Mapping[str, str] | None = None,
+) -> dict[str, str]:
     """Write index.html, pictures/ and data/ into `out` from the results in a folder.
 
-    No model of a body is run. `columns` select models; `command` made the results. Raises a
-    ValueError if the folder has no result or no such column.
+    No model of a body is run. `columns` select models; `command` made the results, without the
+    parts in `failures`. Returns the reasons of all parts that failed. Raises a ValueError if the
+    folder has no result or no such column.
     """
+    failed = dict(failures or {})
     album = select_columns(open_album(results), columns)
     gallery = Gallery(style=style, formats=formats)
-    before = [*picture_parts(album, gallery, progress), *map_parts(album, gallery)]
+    before = [*picture_parts(album, gallery, progress, failed), *map_parts(album, gallery)]
     progress("write data", 0.0)
     _write_data(out / "data", album)
     groups = {name: _with_kernels(runs) for name, runs in album.groups.items()}
@@ -91,13 +92,17 @@ def write_report(
     drawn_with = renderer().detail if renderer().is_available else "none"
     page_of(
         album.title, album.groups, first_screen(groups, partial(_maps, album)), gallery,
-        before=before, after=[scene, *_wave_parts(album, gallery)], modelled=_plan_parts(album),
-        progress=progress, command=command or _command(results),
+        before=before, after=[scene, *_wave_parts(album, gallery, failed)],
+        modelled=_plan_parts(album), progress=progress, failures=failed,
+        command=command or _command(results),
         notes=[f"Renderer of three-dimensional pictures: {drawn_with}."],
     ).write(out)  # fmt: skip
+    return failed
 
 
-def picture_parts(album: Album, gallery: Gallery, progress: Progress) -> list[Part]:
+def picture_parts(
+    album: Album, gallery: Gallery, progress: Progress, failures: dict[str, str]
+) -> list[Part]:
     """Return parts of a page that show the views, or say why there are none."""
     views = list(album.views.values())
     if not views:
@@ -108,7 +113,7 @@ def picture_parts(album: Album, gallery: Gallery, progress: Progress) -> list[Pa
     options: dict[str, Part] = {}
     missing: list[Part] = []
     if renderer().is_available:
-        options = _spatial_parts(own, frame, views, gallery, progress)
+        options = _spatial_parts(own, frame, views, gallery, progress, failures)
     else:
         missing = [f"Three-dimensional pictures and the film are left out: {renderer().detail}."]
     progress("draw snapshots", 0.0)
@@ -119,19 +124,23 @@ def picture_parts(album: Album, gallery: Gallery, progress: Progress) -> list[Pa
 
 
 def _spatial_parts(
-    own: View, frame: int, views: Sequence[View], gallery: Gallery, progress: Progress
-) -> dict[str, Part]:
-    """Return three-dimensional pictures at a frame, and the film."""
+    own: View, frame: int, views: Sequence[View], gallery: Gallery, progress: Progress,
+    failures: dict[str, str],
+) -> dict[str, Part]:  # fmt: skip
+    """Return three-dimensional pictures at a frame, and the film, without those that fail."""
+    parts: dict[str, Part] = {}
     progress("draw side by side", 0.0)
     scales = (f"{label(view.column)}: {render.scale_text(view)}" for view in views)
     peaks = (f"{label(view.column)} {view.quantity.text(view.peak)}" for view in views)
     caption = f"{'; '.join(scales)}. Largest values: {', '.join(peaks)}. {MARKS} {COMPARED}"
-    pixels = render.picture(views, gallery.style, frame)
-    parts: dict[str, Part] = {
-        "side by side": gallery.image("side-by-side", pixels, caption),
-        "film": _film(own, views, gallery.style, progress),
-    }
-    if len(own.tets):
+    with or_failed(failures, "picture side by side"):
+        pixels = render.picture(views, gallery.style, frame)
+        parts["side by side"] = gallery.image("side-by-side", pixels, caption)
+    with or_failed(failures, "film"):
+        parts["film"] = _film(own, views, gallery.style, progress)
+    if not len(own.tets):
+        return parts
+    with or_failed(failures, "picture cut open"):
         progress("draw cut open", 0.0)
         largest = np.abs(own.inward).max(axis=1)
         in_view = own.scene.tacton.trajectory.position(own.times)[:, 1] >= 0
@@ -169,10 +178,14 @@ def map_parts(album: Album, gallery: Gallery) -> list[Part]:
     for name, field in album.maps.items():
         if (scene := scenes[name]).reading.is_plain:
             continue
-        caption = f"{label(name)}: {' '.join(map_sentences(scene, field))} {MAP}"
+        caption = f"{label(name)}: {' '.join(map_sentences(scene, field))} {_map_caption(scene)}"
         figure = maps.surfaces_figure(scene, {name: field}, gallery.style)
         parts.append(gallery.figure(f"quantity-{folder_name(name)}", figure, caption))
     return [Section("Where the quantity is largest", parts)] if parts else []
+
+
+def _map_caption(scene: Scene) -> str:
+    return f"{maps.rms_text(scene.pressure)} {MAP}"
 
 
 def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
@@ -220,15 +233,15 @@ def _plan_parts(album: Album) -> list[Part]:
     return [*parts, *(f"Warning: {text}." for text in planned["warnings"])]
 
 
-def _wave_parts(album: Album, gallery: Gallery) -> list[Part]:
+def _wave_parts(album: Album, gallery: Gallery, failures: dict[str, str]) -> list[Part]:
     """Return dispersion curves of the scene's body, if it has any."""
     if album.scene.body.of_kind.dispersion is None:
         return []
-    try:
+    # Such as a table of moduli that does not cover the frequencies.
+    with or_failed(failures, "dispersion curves"):
         parts = dispersion.page_parts(dispersion.driven_modes(album.scene), gallery)
-    except ValueError as error:  # such as a table of moduli that does not cover the frequencies
-        parts = [f"No dispersion curves: {error}."]
-    return [Details("Which waves the body guides, and which the load drives", parts)]
+        return [Details("Which waves the body guides, and which the load drives", parts)]
+    return []
 
 
 def _command(results: Path) -> str:
@@ -268,4 +281,6 @@ def write_map(folder: Path, scene: Scene, field: SurfaceField) -> None:
     surface.save(folder / "map.npz", field)
     figure = maps.surfaces_figure(scene, {scene.reading.words: field})
     title = f"{scene.name}: {scene.reading.words}"
-    Report(title, map_sentences(scene, field), [Picture(png(figure), MAP, "map")]).write(folder)
+    Report(
+        title, map_sentences(scene, field), [Picture(png(figure), _map_caption(scene), "map")]
+    ).write(folder)

@@ -36,6 +36,7 @@ from skinwave.studies.first_screen import Maps, first_name, first_screen, quick_
 from skinwave.studies.pages import Gallery, efforts_of, page_of
 from skinwave.system import document
 from skinwave.system.effort import Progress, one_thread, peak_memory, silent
+from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.processes import pool
 
 # Models that plans choose, in the order of increasing completeness.
@@ -53,12 +54,13 @@ Scenes = Mapping[str, Mapping[str, Scene]]  # Tacton -> column -> scene
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOutcome:
-    """Outcome of a comparison: number of finished and of `planned` runs, and conclusions on the
-    agreement with a measurement.
+    """Outcome of a comparison: number of finished and of `planned` runs, failed parts, and
+    conclusions on the agreement with a measurement.
     """
 
     assessed_claims: list[AssessedClaim]
     warnings: list[str]
+    failures: Mapping[str, str]
     runs: int
     planned: int
     seconds: float
@@ -93,13 +95,15 @@ def run_study(
     command: str,
     measured: Measured | None = None,
     more: Sequence[document.Part] = (),
+    failures: Mapping[str, str] | None = None,
 ) -> StudyOutcome:
     """Run every scene, write each run when it is finished, then write tables and page.
 
     Each body has one model: the given one, finite elements if their size is given, or the most
     complete one that plans choose for its scenes. A measurement is compared with the models of its
-    Tacton. `more` are further parts of the page. After an interrupt, finished runs are compared and
-    written.
+    Tacton. `more` are further parts of the page; `failures` are of parts made before. After an
+    interrupt or a failure, the other runs are compared and written; raises a ValueError if all
+    fail.
     """
     models = _models(scenes, options)
     started, planned, progress = (
@@ -108,22 +112,26 @@ def run_study(
         options.progress,
     )
     groups: dict[str, list[Run]] = {}
+    failed, interrupted = dict(failures or {}), True
     prepared: dict[str, ReducedBody] = {}
     options = replace(options, model="auto", progress=silent)
     with one_thread(), pool(2) as workers:
         maps = {
-            scene.body: workers.submit(slow_maps, scene, options)
+            scene: workers.submit(slow_maps, scene, options)
             for scene in scenes[first_name(scenes)].values()
             if scene.body.of_kind.discretise and scene.reading.is_plain
             and not has_wavenumber_integral(scene)
         }  # fmt: skip
         with suppress(KeyboardInterrupt):
-            for run in _runs(scenes, models, options, prepared, progress, workers):
+            for run in _runs(scenes, models, options, prepared, progress, workers, failed):
                 write_run(folder / run.tacton / run.column, run)
                 groups.setdefault(run.tacton, []).append(run)
-        if not groups:
-            raise KeyboardInterrupt
+            interrupted = False
         runs = [run for group in groups.values() for run in group]
+        if interrupted and not runs:
+            raise KeyboardInterrupt
+        if not (interrupted or any(run.response.record.of_body for run in runs)):
+            raise ValueError(failure_text(failed))
         progress("write tables", 0.0)
         assessed_claims = evaluate(assessable_runs(runs))
         write_claims(folder / "claims.csv", assessed_claims)
@@ -132,8 +140,8 @@ def run_study(
         write_responses(folder / "responses.npz", by_name)
         first = None
         with suppress(KeyboardInterrupt):
-            if len(runs) == planned:
-                first = first_screen(groups, lambda run: _maps(run, maps, progress))
+            if not interrupted:
+                first = first_screen(groups, lambda run: _maps(run, maps, progress, failed))
     parts: list[document.Part] = [*more]
     figures: dict[str, Sequence[Run]] = dict(groups)
     conclusions: list[str] = []
@@ -150,16 +158,16 @@ def run_study(
         parts.append(comparison_page.page_section(comparison, Gallery().figure))
         figures[name] = runs_to_draw(comparison)
         first = replace(first, measured=measured_places(comparison)) if first else None
-    if len(runs) < planned:
+    if interrupted:
         parts.insert(0, f"Interrupted: this page shows the {len(runs)} finished of {planned} runs.")
     page_of(
         title, groups, first, Gallery(), figures=figures, progress=progress, before=parts,
-        modelled=[ABOUT], seconds=time.perf_counter() - started, command=command,
+        modelled=[ABOUT], seconds=time.perf_counter() - started, command=command, failures=failed,
         notes=["For one run: skinwave run TACTON/BODY/scene.toml in this folder."],
     ).write(folder)  # fmt: skip
     return StudyOutcome(
         assessed_claims=assessed_claims, warnings=document.worst_warnings(efforts_of(runs)),
-        runs=len(runs), planned=planned, seconds=time.perf_counter() - started,
+        failures=failed, runs=len(runs), planned=planned, seconds=time.perf_counter() - started,
         conclusions=conclusions,
         peak_memory=max(peak_memory(), *(run.response.effort.peak_memory for run in runs)),
     )  # fmt: skip
@@ -193,8 +201,9 @@ def _completeness(model: str) -> int:
 def _runs(
     scenes: Scenes, models: Mapping[str, str], options: SolveOptions,
     prepared: dict[str, ReducedBody], progress: Progress, workers: Executor,
+    failures: dict[str, str],
 ) -> Iterator[Run]:  # fmt: skip
-    """Yield every run, those of fast models first.
+    """Yield every run that does not fail, those of fast models first.
 
     Bodies are reduced here, once for all Tactons, into `prepared`. Workers compute the coarser
     bodies, for the errors, and all other responses.
@@ -210,18 +219,24 @@ def _runs(
         if column not in reduced
     }
     for k, (name, column, scene) in enumerate(every):
-        if column in reduced:
-            if column not in prepared:
-                reporting = replace(options, progress=partial(_report, progress, column))
+        response = None
+        if column in reduced and column not in prepared and column not in failures:
+            reporting = replace(options, progress=partial(_report, progress, column))
+            with or_failed(failures, column):
                 prepared[column] = prepare(scene, reporting)
-            response, body = answer(prepared[column], scene), prepared[column]
-            compared = coarser[scene.body].result()
-            response = assess(scene, response, body, options, compared=compared)
-        else:
-            response = others[name, column].result()
+        if column in reduced and column not in prepared:
+            continue  # all Tactons on this body failed
+        with or_failed(failures, f"{name} on {column}"):
+            if column in reduced:
+                response, body = answer(prepared[column], scene), prepared[column]
+                compared = coarser[scene.body].result()
+                response = assess(scene, response, body, options, compared=compared)
+            else:
+                response = others[name, column].result()
         progress(f"response of {name} by {column}", (k + 1) / len(every))
         body_name = column if scene.body.of_kind.discretise else "none"
-        yield Run(tacton=name, body=body_name, scene=scene, response=response)
+        if response:
+            yield Run(tacton=name, body=body_name, scene=scene, response=response)
 
 
 def _report(progress: Progress, column: str, phase: str, fraction: float) -> None:
@@ -234,8 +249,11 @@ def _response(scene: Scene, options: SolveOptions) -> Response:
     return solve(scene, plan(scene, options))
 
 
-def _maps(run: Run, submitted: Mapping[Body, Future[Maps]], progress: Progress) -> Maps:
-    if run.scene.body not in submitted:
-        return quick_maps(run)
-    progress(f"map of {run.column}", 0.0)
-    return submitted[run.scene.body].result()
+def _maps(
+    run: Run, submitted: Mapping[Scene, Future[Maps]], progress: Progress, failures: dict[str, str]
+) -> Maps:
+    """Return the maps of a body and of the kernel, or none if they fail."""
+    with or_failed(failures, name := f"map of {run.column}"):
+        progress(name, 0.0)
+        return submitted[run.scene].result() if run.scene in submitted else quick_maps(run)
+    return ()

@@ -6,8 +6,8 @@ Errors are those of the worst probe's waveform.
 
 import os
 import time
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ from skinwave.results.comparison import compare
 from skinwave.scene.scene import Scene, check_load
 from skinwave.system.document import Picture, Report
 from skinwave.system.effort import Progress, peak_memory
+from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.processes import pool
 from skinwave.system.table import Column, Table
 
@@ -87,11 +88,14 @@ class Result:
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Results of all candidates by cold time, and self-convergence of the reference."""
+    """Results of all candidates by cold time, self-convergence of the reference, and reasons of
+    candidates that failed.
+    """
 
     results: tuple[Result, ...]
     reference: Candidate
     self_convergence: float
+    failures: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def is_converged(self) -> bool:
@@ -128,7 +132,8 @@ def candidates(scene: Scene) -> list[Candidate]:
 def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None = None) -> Study:
     """Measure candidates on a scene, each in a process of its own, which measures its memory.
 
-    Raises a ValueError if the scene has no body, or a load other than a pressure.
+    Raises a ValueError if the scene has no body, or a load other than a pressure, or if the
+    reference or every candidate fails.
     """
     check_load(scene, "tradeoff")
     if not scene.body.of_kind.discretise:
@@ -138,13 +143,17 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
     if stretches(scene, min(BARS)):
         fine = [Candidate(model=STRETCHED.name, tolerance=t) for t in FINEST_TOLERANCES]
     runs = {}
+    failures: dict[str, str] = {}
     with pool(1, threads=None, renewed=True) as other:
         for k, candidate in enumerate([*fine, *tested]):
             progress(candidate.name, k / (len(tested) + len(fine)))
-            runs[candidate.name] = other.submit(_run, scene, candidate).result()
+            with or_failed(failures, candidate.name):
+                runs[candidate.name] = other.submit(_run, scene, candidate).result()
+    if any(each.name in failures for each in fine) or len(failures) == len(tested):
+        raise ValueError(failure_text(failures))
     coarser, reference = (runs[each.name][0] for each in fine)
     results = []
-    for each in tested:
+    for each in (one for one in tested if one.name in runs):
         response, cold, warm, memory = runs[each.name]
         error = float(compare(reference, response).relative_l2.max())
         results.append(Result(
@@ -153,7 +162,7 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
         ))  # fmt: skip
     return Study(
         results=tuple(sorted(results, key=lambda result: result.cold)), reference=fine[-1],
-        self_convergence=float(compare(reference, coarser).relative_l2.max()),
+        self_convergence=float(compare(reference, coarser).relative_l2.max()), failures=failures,
     )  # fmt: skip
 
 
@@ -187,7 +196,7 @@ def write(folder: Path, scene: Scene, outcome: Study) -> None:
     title = f"Speed against accuracy: {scene.name}"
     parts = sentences(outcome)
     verdict = [" ".join(parts[-len(BARS) :]), " ".join(parts[: -len(BARS)])]
-    Report(title, verdict, [picture, table]).write(folder)
+    Report(title, verdict, [picture, table], failures=outcome.failures).write(folder)
 
 
 def sentences(outcome: Study) -> list[str]:

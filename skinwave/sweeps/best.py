@@ -42,7 +42,7 @@ class Best:
     limits : lowest and highest value of the grid
     interval : 95 % interval of the samples' best values; None if no uncertain number of the scene
         affects the column
-    samples : int, number of samples
+    samples, failed : int, number of samples, and of others without a number in the column
     uncertain : keys of the sampled numbers
 
     >>> best = Best(key="tacton.size_mm", column="rms_um[0]", value=14, result=3.2, limits=(5, 20))
@@ -57,6 +57,7 @@ class Best:
     limits: tuple[float, float]
     interval: tuple[float, float] | None = None
     samples: int = 0
+    failed: int = 0
     uncertain: tuple[str, ...] = ()
 
     @property
@@ -149,7 +150,9 @@ def find_best(
     margin = ACCURACY * np.diff(np.unique(values)).max()
     low, high = np.clip((low - margin, high + margin), *found.limits).tolist()
     uncertain = tuple(each.key for each in spreads)
-    return replace(found, interval=(low, high), samples=len(bests), uncertain=uncertain)
+    return replace(
+        found, interval=(low, high), samples=len(bests), failed=n - len(bests), uncertain=uncertain
+    )
 
 
 def _column(sweep: Sweep, column: str, combined: Combinations) -> Floats:

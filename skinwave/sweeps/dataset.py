@@ -100,6 +100,11 @@ def read(out: Path) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: row[INDEX])
 
 
+def failures_of(rows: Iterable[Row]) -> dict[str, str]:
+    """Return the reason of each failed run."""
+    return {f"run {row['index']}": row["error"] for row in rows if row["status"] == "failed"}
+
+
 def names(out: Path) -> dict[str, int]:
     """Return the index of each row by its name."""
     table = _table(out).select([KEY, INDEX])

@@ -32,6 +32,7 @@ from skinwave.models.parametric import lines_of
 from skinwave.models.reduced import components, prepare
 from skinwave.planning.simulate import compute
 from skinwave.report.styles import SHOWN
+from skinwave.results.comparison import steady_rms
 from skinwave.results.surface import LOWEST_LEVEL, REACH, grid, has_wavenumber_integral
 from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
@@ -376,7 +377,7 @@ def _compute(scene: Scene, method: Method) -> Solution:
         amplitudes = np.reshape([*table.amplitudes.values()], (-1, len(scene.probes)))
         level = _highest_level([*table.frequencies.values()], amplitudes)
     return Solution(
-        waveform=motion, lines=lines, rms=settled.std(axis=0),
+        waveform=motion, lines=lines, rms=steady_rms(response),
         level=level, map_rms=no_map, map_level=no_map,
     )  # fmt: skip
 

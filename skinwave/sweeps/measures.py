@@ -8,7 +8,7 @@ import numpy as np
 from simple_model import Effort, Response, named_lines, point_kernel
 from simple_model.quantities import DISPLACEMENT, Quantity
 from skinwave.models.options import sample_times
-from skinwave.results.comparison import compare, moving_rms
+from skinwave.results.comparison import compare, spread, steady_rms
 from skinwave.results.run import ASSESSED, SUPPORT, Run
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
@@ -48,9 +48,11 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
     run = Run(tacton=scene.name, body=scene.body.kind, scene=scene, response=response)
     agreement, scale = compare(kernel, response), response.record.per_unit
     unit = unit_of(response.record)
+    support = [run.line_hz[SUPPORT]] if SUPPORT in run.line_hz else []
+    within = spread(response, support)
     row: dict[str, Any] = {
         "status": "done", "model": response.model,
-        "kernel_peak_pa": _peak(kernel), "kernel_rms_pa": moving_rms(kernel),
+        "kernel_peak_pa": _peak(kernel), "kernel_rms_pa": steady_rms(kernel),
         "kernel_misfit": agreement.relative_l2, "kernel_shape_misfit": agreement.shape_misfit,
         "kernel_delay_ms": 1e3 * agreement.delay,
         "kernel_spread_6db_mm": 1e3 * agreement.spread_reference[-6],
@@ -58,9 +60,9 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
     } | _cost(response.effort)  # fmt: skip
     if of_body:
         row |= {
-            f"peak_{unit}": scale * _peak(response), f"rms_{unit}": scale * moving_rms(response),
-            "spread_6db_mm": 1e3 * agreement.spread_candidate[-6],
-            "spread_20db_mm": 1e3 * agreement.spread_candidate[-20],
+            f"peak_{unit}": scale * _peak(response),
+            f"rms_{unit}": scale * steady_rms(response, support),
+            "spread_6db_mm": 1e3 * within[-6], "spread_20db_mm": 1e3 * within[-20],
         }  # fmt: skip
     levels = run.levels
     if levels and not run.in_pulses.unresolved:

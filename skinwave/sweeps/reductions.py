@@ -25,6 +25,7 @@ from skinwave.planning.refinement import comparison_size, refine
 from skinwave.scene.scene import Body, Scene, without_tacton
 from skinwave.scene.variation import DesignPoint
 from skinwave.system.effort import Progress
+from skinwave.system.failures import reason
 
 PER_WORKER = 3  # fewest bodies of a family: fewer are faster alone, one on each worker
 CACHED = 4  # bodies that a worker caches in memory, on two meshes each
@@ -130,14 +131,7 @@ def _mesh_or_error(
     try:
         return work(options, item)
     except Exception as error:
-        return Mesh(error=error_text(error))
-
-
-def error_text(error: Exception) -> str:
-    """Return an error as a cell of the table, with its type unless it is a message to users."""
-    text = " ".join(str(error).split())
-    is_message = isinstance(error, ValueError | ArithmeticError) and text
-    return text if is_message else f"{type(error).__name__}: {text}"
+        return Mesh(error=reason(error))
 
 
 def mesh_of_body(options: SolveOptions, scene: Scene) -> Mesh:

@@ -20,13 +20,13 @@ from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import input_columns, result_columns
 from skinwave.sweeps.reductions import (
     Mesh,
-    error_text,
     model_of,
     on_mesh,
     reduced_scene,
     shared_meshes,
 )
 from skinwave.system.effort import Progress, silent
+from skinwave.system.failures import reason
 
 BATCH = 8  # most runs of one body that are handed out together
 Combinations = Sequence[Mapping[str, Any]]  # values by key, for each run
@@ -180,7 +180,7 @@ def _row(
         row |= response.effort.errors.columns()
         row |= result_columns(point.scene, response)
     except Exception as error:  # of any kind: the other runs continue
-        row["error"] = error_text(error)
+        row["error"] = reason(error)
     return row | {"seconds": time.perf_counter() - started}
 
 

@@ -120,9 +120,8 @@ def write_uncertainty(
     its rows in the order of the design; return their names. Sobol' indices need every run.
     """
     done = finished_rows(rows)
-    failed = len(rows) - len(done)
+    failures = dataset.failures_of(rows)
     text = f"{len(done)} runs of {plural(len(spreads), 'uncertain number')}."
-    text += f" {failed} failed and are left out." if failed else ""
     numbers = [(s.key, f"{significant(s.value)}: {s.distribution.words}") for s in spreads]
     parts: list[Part] = [Table(["key", "distribution"], numbers)]
     table = row_percentiles(done)
@@ -135,12 +134,13 @@ def write_uncertainty(
             f"ten runs {interval(low, high, 3)}."
         )
     files = {PERCENTILE_FILE: table.to_csv()}
-    if has_indices and not failed:
+    if has_indices and not failures:
         indices = index_table(rows, [s.key for s in spreads])
         files[INDEX_FILE] = indices.to_csv()
         parts += [INDICES, _with_labels(indices)]
     parts.append(Details("Percentiles at every probe", [_with_labels(table)]))
-    files[PAGE] = Report(f"Uncertainty of {out.name}", verdict, parts).html().encode()
+    page = Report(f"Uncertainty of {out.name}", verdict, parts, failures=failures)
+    files[PAGE] = page.html().encode()
     dataset.write_beside(out, files)
     return list(files)
 

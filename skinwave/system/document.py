@@ -15,6 +15,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from simple_model import Effort
+from skinwave.system.failures import failure_text
 from skinwave.system.table import Table
 from skinwave.system.templates import part, render, typeset
 
@@ -97,7 +98,8 @@ Part = str | Table | Picture | Section | Details | Choice
 class Report:
     """A page: title, paragraphs of the verdict, and parts.
 
-    Warnings of `efforts`, given by name, come first. Pictures are written to the folder `pictures`.
+    The first sentence names `failures`; warnings of `efforts`, given by name, follow. Pictures are
+    written to the folder `pictures`.
     """
 
     title: str
@@ -105,13 +107,15 @@ class Report:
     parts: Sequence[Part] = ()
     efforts: Sequence[tuple[str, Effort]] = ()
     pictures: str = ""
+    failures: Mapping[str, str] = field(default_factory=dict)
 
     def html(self) -> str:
         """Return the page with its policy."""
-        verdict = (
-            Markup('<p class="verdict">{}</p>').format(typeset(said)) for said in self.verdict
+        failed, *verdict = (
+            Markup('<p class="verdict">{}</p>').format(typeset(said)) if said else Markup()
+            for said in (failure_text(self.failures), *self.verdict)
         )
-        parts = (warnings_banner(self.efforts), *verdict, *self.parts)
+        parts = (failed, warnings_banner(self.efforts), *verdict, *self.parts)
         body = Markup("\n").join(map(_html, parts))
         return render("page.html", title=self.title, body=body, policy=_policy(body))
 

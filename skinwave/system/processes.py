@@ -12,7 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
+    from concurrent.futures import Executor, ProcessPoolExecutor
 
 SAFE_PATH = {"PYTHONSAFEPATH": "1"}  # do not import a random.py of the working folder
 
@@ -50,12 +50,22 @@ def pool(count: int, threads: int | None = 1, *, renewed: bool = False) -> "Iter
         try:
             yield executor
         finally:
-            workers = list((executor._processes or {}).values())
-            executor.shutdown(wait=False, cancel_futures=True)
-            for worker in workers:
-                worker.terminate()
-            for worker in workers:
-                worker.join()
+            _end(executor)
+
+
+def _end(executor: "ProcessPoolExecutor") -> None:
+    """Cancel the work of an executor, end its processes, and wait for its own thread.
+
+    That thread may start a process for the next call until it knows that there is none.
+    """
+    ending = threading.Thread(
+        target=executor.shutdown, kwargs={"cancel_futures": True}, daemon=True
+    )
+    ending.start()
+    while ending.is_alive():
+        for worker in list((executor._processes or {}).values()):
+            worker.terminate()
+        ending.join(0.05)
 
 
 def begin_worker(threads: int | None) -> None:

@@ -75,7 +75,18 @@ def page(results: list[Result], planned: int) -> Report:
         for topic, cases in TOPICS.items()
         if any(r.case in cases for r in results)
     ]
-    return Report("Verification", [" ".join(verdict)], [summary, *topics, SCOPE, spent])
+    return Report(
+        "Verification", [" ".join(verdict)], [summary, *topics, SCOPE, spent],
+        failures=failures_of(results),
+    )  # fmt: skip
+
+
+def failures_of(results: Iterable[Result]) -> dict[str, str]:
+    """Return what is wrong with each failed case by its name."""
+    return {
+        r.case.name: r.error or f"{r.worst.what}: error {r.worst.error:.1e} of {r.worst.bar:.1e}"
+        for r in results if not r.passed
+    }  # fmt: skip
 
 
 def summary(results: list[Result]) -> str:

@@ -16,6 +16,7 @@ from skinwave import BODIES
 from skinwave.bodies.sizes import check_mesh
 from skinwave.commands.cli import main
 from skinwave.commands.common import progress_of
+from skinwave.studies import study
 
 CLAMPED = SMALL.replace("[body]", '[body]\nthickness_mm = 8\nsides = "clamped"')
 
@@ -67,6 +68,32 @@ def test_compare_a_scene_of_ones_own(scene):
     assert (folder / "short/slab/scene.toml").exists()
     assert (folder / "short/point-kernel/responses.npz").exists()
     assert (folder / "pictures/short.png").stat().st_size > 10_000
+
+
+@pytest.mark.usefixtures("in_one_process")
+def test_a_run_that_fails_is_named_first_and_the_others_are_compared(scene, monkeypatch, capsys):
+    solve = study._response
+
+    def fails_on_paper(scene, *given):
+        if scene.body.of_kind.is_plate:
+            raise ArithmeticError("no solution")
+        return solve(scene, *given)
+
+    monkeypatch.setattr(study, "slow_maps", Mock(side_effect=ArithmeticError("no solution")))
+    monkeypatch.setattr(study, "_response", fails_on_paper)
+    monkeypatch.setattr("skinwave.live.html_file.pack_of", Mock(side_effect=ValueError("no pack")))
+    scene.write_text(SMALL.partition("[body]")[0] + '[body]\nkind = "none"\n')
+    assert main(["compare", str(scene), "--out", "both", "--json"]) == 1
+    first, *_ = (said := json.loads(capsys.readouterr().out))["sentences"]
+    assert first.startswith("2 parts of this result failed: ")
+    assert said["failures"]["short on paper-sheet"] == "no solution"
+    assert said["failures"]["live page"] == "no pack"
+    page = read_results.page(scene.parent / "both/index.html")
+    assert page.index(first) < page.index("rive law and focus")
+    # Nothing is written of a comparison without a body.
+    monkeypatch.setattr(study, "_response", Mock(side_effect=ArithmeticError("none")))
+    assert main(["compare", str(scene), "--out", "none"]) == 2
+    assert not (scene.parent / "none").exists()
 
 
 def test_plan_gives_a_reason_for_every_row(scene, capsys):

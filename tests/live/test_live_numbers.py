@@ -16,6 +16,8 @@ from simple_model.load.line_names import line_names
 from simple_model.load.path_cells import is_abrupt
 from simple_model.load.spectrum import pressure_lines
 from simple_model.threshold import pressure_threshold
+from skinwave.live import html_file
+from skinwave.live.packs import pack_of
 from skinwave.live.values import control_values, presets
 from skinwave.measure.reading import read
 from skinwave.results.comparison import phase_delays
@@ -265,3 +267,18 @@ def test_other_files_are_refused(page):
     read_all = "(texts) => texts.map((text) => attempt(() => readMeasurement(text, 'a.csv')))"
     for found in page.evaluate(read_all, REFUSED):
         assert "skinwave web" in found["refused"]
+
+
+def test_a_body_without_a_pack_is_named_on_the_page(monkeypatch):
+    def packed(body, progress):
+        if body.of_kind.is_plate:
+            raise ArithmeticError("no modes")
+        return pack_of(body, progress)
+
+    monkeypatch.setattr(html_file, "pack_of", packed)
+    found = html_file.data_of(bodies=["paper-sheet", "skin-slab"], test=False)
+    assert [record["name"] for record in found["bodies"]] == ["skin-slab"]
+    assert found["start"] == {"body": "skin-slab"}
+    assert "1 part of this result failed" in html_file.page(found)
+    with pytest.raises(ValueError, match="no modes"):
+        html_file.data_of(bodies=["paper-sheet"], test=False)

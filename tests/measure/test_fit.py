@@ -12,7 +12,7 @@ from simple_model.layers.flat_body import steady_lines
 from simple_model.load.spectrum import synthesise
 from skinwave.bodies.analytic import compliance
 from skinwave.commands import cli
-from skinwave.measure import Measurement
+from skinwave.measure import Measurement, search
 from skinwave.measure.findings import cautions
 from skinwave.measure.fit import fit
 from skinwave.measure.fit_page import fitted_scene, summary
@@ -294,3 +294,17 @@ def test_the_command_writes_a_scene_and_a_page(scene, lines, tmp_path, capsys):
     assert loads(text).body.material.shear_modulus == pytest.approx(30e3, rel=0.02)
     names = {"estimates.csv", "fit.json", "fit.npz", "fitted.png", "residuals.png", "record.json"}
     assert names <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+def test_a_start_that_fails_leaves_the_others(monkeypatch):
+    def refined(problem, start):
+        if start:
+            raise ArithmeticError("not finite")
+        return search.Start(begun=np.zeros(1), ended=np.zeros(1), cost=0.0, converged=True)
+
+    monkeypatch.setattr(search, "best_candidate", lambda problem, candidates: candidates)
+    monkeypatch.setattr(search, "refine", refined)
+    monkeypatch.setattr(search, "descend", lambda problem, local: local)
+    failures = {}
+    assert len(search.search(None, [False, True, False], lambda *phase: None, failures)) == 2
+    assert failures == {"start 2": "not finite"}

@@ -5,6 +5,7 @@ import json
 import numpy as np
 from markupsafe import Markup
 
+from simple_model import Effort
 from simple_model.numbers import decibel, interval, significant, with_error
 from skinwave.system.document import Details, Picture, Report, Section
 from skinwave.system.table import Column, Table
@@ -56,7 +57,21 @@ def test_a_report_writes_its_page_pictures_and_tables(tmp_path):
     parts = [Section("A", [Details("B", [TABLE, Picture(b"p", "caption", "map")])]), "<text>"]
     Report("title", ["verdict"], parts).write(tmp_path)
     page = (tmp_path / "index.html").read_text()
+    assert "failed" not in page
     assert page.index("<h1>title") < page.index(">verdict") < page.index(">A</h2>")
     assert "<p>&lt;text&gt;</p>" in page
     assert (tmp_path / "map.png").read_bytes() == b"p"
     assert (tmp_path / "lines.csv").read_bytes() == TABLE.to_csv()
+
+
+def test_the_first_sentence_of_a_page_names_what_failed():
+    failures = {"film": "no memory.", "map of palm": "no mesh"} | {
+        f"run {k}": "bad" for k in range(9)
+    }
+    warned = [("", Effort(warnings=("coarse",)))]
+    page = Report("title", ["verdict"], efforts=warned, failures=failures).html()
+    said = (
+        "11 parts of this result failed: film (no memory); map of palm (no mesh); run 0, run 1, "
+        "run 2 and 6 more (bad)."
+    )
+    assert page.index(said) < page.index("coarse") < page.index(">verdict")

@@ -11,6 +11,8 @@ from importlib.util import find_spec
 from io import BytesIO
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -316,6 +318,16 @@ def test_a_report_is_drawn_again_without_a_model_or_gl(folder, tmp_path, monkeyp
     assert "apt install libegl1 libgl1-mesa-dri" in text
     assert (tmp_path / "flat/pictures/snapshots.png").exists()
     assert not (tmp_path / "flat/pictures/film.gif").exists()
+
+
+def test_a_film_that_fails_is_left_out_by_name(monkeypatch):
+    view = SimpleNamespace(column="palm", quantity=DISPLACEMENT, peak=1.0, tets=())
+    monkeypatch.setattr(render, "scale_text", lambda view: "to scale")
+    monkeypatch.setattr(render, "picture", lambda *given: np.zeros((8, 8, 3), np.uint8))
+    monkeypatch.setattr(report, "_film", Mock(side_effect=ArithmeticError("no frames")))
+    gallery, failures = pages.Gallery(), {}
+    parts = report._spatial_parts(view, 0, [view], gallery, lambda *phase: None, failures)
+    assert (list(parts), failures) == (["side by side"], {"film": "no frames"})
 
 
 def test_a_crash_of_the_renderer_is_detected(monkeypatch):

@@ -131,7 +131,7 @@ def test_pictures_are_coloured_by_the_quantity(view):
 def test_a_report_maps_the_quantity_at_the_depth_of_the_probes(view, moved, tmp_path):
     quantity = "strain_zz"
     scene = replace(SCENE, quantity=quantity, depth=0.7e-3)
-    album.write_view(replace(view, scene=scene), tmp_path)
+    album.write_view(replace(view, scene=scene), tmp_path, {})
     found = surface.load(tmp_path / "map.npz", scene)
     assert found.depth == 0.7e-3
     seen = motion.probe_lines(scene, moved)
@@ -153,7 +153,7 @@ def test_a_report_maps_the_quantity_at_the_depth_of_the_probes(view, moved, tmp_
 
 
 def test_a_report_of_motion_maps_the_surface(view, moved, tmp_path):
-    album.write_view(view, tmp_path)
+    album.write_view(view, tmp_path, {})
     found = surface.load(tmp_path / "map.npz", SCENE)
     at = np.unravel_index(np.nanargmax(found.rms), found.rms.shape)
     _, inwards = node_operator(moved.mesh, patch=SCENE.body.of_kind.normal_patch)

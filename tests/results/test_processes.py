@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from argparse import Namespace
 from pathlib import Path
 
@@ -56,6 +57,14 @@ def test_each_call_of_a_renewed_pool_has_a_process_of_its_own():
     with pool(1, renewed=True) as other:
         calls = [other.submit(os.getpid) for _ in range(3)]
         assert len({call.result() for call in calls} | {os.getpid()}) == 4
+
+
+def test_no_thread_of_a_pool_outlives_it():
+    before = set(threading.enumerate())
+    with pool(1, renewed=True) as other:
+        assert other.submit(abs, -1).result() == 1
+    # It would start a process for the next call, and print a traceback.
+    assert set(threading.enumerate()) <= before
 
 
 def test_a_pool_cancels_unfinished_calls_and_restores_the_environment(monkeypatch):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import inf, pi
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from simple_model import MovingPressure, Response, Rhythm, Tacton, Trajectory, p
 from simple_model.load.spectrum import load_lines, synthesise
 from skinwave.models.options import SolveOptions
 from skinwave.planning.simulate import compute, simulate
+from skinwave.report.maps import rms_text
+from skinwave.results import surface
 from skinwave.results.claims import evaluate
-from skinwave.results.comparison import compare
+from skinwave.results.comparison import compare, steady_lines, steady_rms
 from skinwave.results.propagation import propagation, share_outside
 from skinwave.results.run import Run
 from skinwave.results.surface import body_map, grid, kernel_map
@@ -111,6 +114,44 @@ def test_steady_lines_of_a_linear_body_are_those_of_the_load():
     a = phasors(motion, lines, settle=0.5)
     explained = synthesise(lines, a, motion.times[kept])
     assert np.linalg.norm(moving - explained) < 1e-3 * np.linalg.norm(moving)
+
+
+def ringing(pressure, seconds):
+    """A steady line of 6 um at 140 Hz, and a free vibration of 9 um at 71 Hz that hardly decays."""
+    t = np.arange(round(1e4 * seconds)) / 1e4
+    wave = 6e-6 * np.sin(2 * pi * 140 * t) + 9e-6 * np.exp(-0.9 * t) * np.cos(2 * pi * 71 * t)
+    return replace(_response(t, 5e-6 + wave, "displacement"), load=pressure)
+
+
+@pytest.mark.parametrize("seconds", [1.0, 0.2])
+def test_spread_and_rms_leave_out_free_vibration(seconds):
+    load = MovingPressure(tacton=replace(BOTH, duration=seconds))
+    expected = 6e-6 / np.sqrt(2) * np.array([1.0, 0.5])
+    np.testing.assert_allclose(steady_rms(ringing(load, seconds)), expected, rtol=0.01)
+
+
+def test_maps_of_a_stretching_sheet_leave_out_free_vibration(monkeypatch):
+    load, (x, y) = MovingPressure(tacton=BOTH), (np.linspace(-1e-3, 1e-3, n) for n in (3, 2))
+    pulsed = replace(load, tacton=replace(BOTH, rhythm=Rhythm(pulses=((0.1, 0.1),))))
+    sheet = Scene(pressure=load, body=BODIES["paper-sheet"], probes=((0.0, 0.0),))
+    modes = SimpleNamespace(at=lambda places: np.tile([1.0, 2.0], (len(places), 1)))
+    found = ringing(load, 0.5)
+    motion = lambda scene, tolerance: (found.times, found.values, modes)  # noqa: E731
+    monkeypatch.setattr(surface, "sheet_motion", motion)
+    monkeypatch.setattr(surface, "beyond_linear", lambda *_: True)
+    drawn = body_map(sheet, x, y)
+    np.testing.assert_allclose(drawn.rms, 2 * 6e-6 / np.sqrt(2), rtol=0.01)
+    # Pulses have no steady vibration: the map is that of the whole motion, and says so.
+    whole = body_map(replace(sheet, pressure=pulsed), x, y)
+    np.testing.assert_allclose(whole.rms, 2 * found.values[:, 0].std(), rtol=0.01)
+    assert "with free vibration" in whole.note
+    assert "steady vibration about" in rms_text(load)
+    assert "whole Tacton" in rms_text(pulsed)
+
+
+def test_lines_that_a_response_does_not_resolve_are_not_called_steady():
+    slow = replace(BOTH, trajectory=Trajectory(shape="circle", size=0.02, speed=0.06))
+    assert steady_lines(ringing(None, 0.5), MovingPressure(tacton=slow)) is None
 
 
 def test_claims_about_presence_of_lines_agree_for_kernel_and_body():

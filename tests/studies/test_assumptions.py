@@ -244,6 +244,26 @@ def test_a_failed_step_leaves_the_others(monkeypatch):
 
 
 @pytest.mark.usefixtures("in_one_process")
+def test_a_failed_step_comes_before_the_ranking(tmp_path, monkeypatch, capsys):
+    def step(scene, dropped):
+        if dropped == ("linear drive", "sinc^2 profile"):
+            raise ValueError("flat-body needs a slab")
+        return scene, "point-kernel" if dropped else "point-kernel-published"
+
+    pretend(monkeypatch, ("linear drive", "sinc^2 profile", "main lobe only"), step)
+    monkeypatch.setattr(relax, "side_step", lambda scene: ())
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(dumps(SKIN))
+    assert main(["relax", "scene.toml"]) == 1
+    first, second, *_ = capsys.readouterr().out.splitlines()
+    failed = "1 part of this result failed: sinc^2 profile (flat-body needs a slab)."
+    unknown = "Not compared, because steps failed: 'sinc^2 profile', 'main lobe only'."
+    assert (first, second) == (failed, unknown)
+    page = re.sub("<[^>]+>", "", read_results.page(tmp_path / "scene-relaxed/index.html"))
+    assert page.index("1 part of this result failed") < page.index("Of the others, ")
+
+
+@pytest.mark.usefixtures("in_one_process")
 def test_a_shared_body_is_reduced_once(monkeypatch):
     small = replace(SKIN, body=Body(width=0.03, height=0.03, depth=0.004))
     names = ("linear drive", "sinc^2 profile")

@@ -9,6 +9,7 @@ from corpus import SHORT
 from simple_model import Tacton, Trajectory
 from skinwave.models import named
 from skinwave.models.limits import takes
+from skinwave.planning.simulate import compute
 from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES, Body
 from skinwave.studies import paper_vs_skin
@@ -40,6 +41,25 @@ def test_tradeoff_ranks_candidates_by_cost_and_error(tmp_path, monkeypatch):
     assert len(phases) == len(chosen) + 2
     write(tmp_path, scene, found)
     assert (tmp_path / "tradeoff.csv").read_text().count("\n") == 5
+
+
+@pytest.mark.usefixtures("in_one_process")
+def test_a_candidate_that_fails_is_named(tmp_path, monkeypatch):
+    kernel, scene = compute(loads(SHORT), "point-kernel"), loads(SHORT)
+
+    def run(scene, candidate):
+        if candidate.dt:
+            raise ArithmeticError("not finite")
+        return kernel, 1.0, 1.0, 0
+
+    monkeypatch.setattr("skinwave.studies.tradeoff._run", run)
+    chosen = [Candidate(model="point-kernel"), Candidate(model="fem-transient", dt=1.0)]
+    found = study(scene, lambda *phase: None, chosen)
+    assert found.failures == {chosen[1].name: "not finite"}
+    write(tmp_path, scene, found)
+    assert "1 part of this result failed" in (tmp_path / "index.html").read_text()
+    with pytest.raises(ValueError, match="not finite"):
+        study(scene, lambda *phase: None, chosen[1:])
 
 
 @pytest.mark.parametrize(
