@@ -5,7 +5,7 @@ rule by which they add.
 """
 
 from collections.abc import Iterator
-from math import inf, isfinite
+from math import inf
 
 from simple_model import ErrorPart
 from skinwave.models import Model
@@ -62,9 +62,10 @@ def element_parts(
     the `mesh` is inf if it is unknown.
     """
     elements = f"elements of {1e3 * h:.3g} mm"
-    if isfinite(mesh):
+    cure = "use smaller elements"
+    if tolerance < mesh < inf:
         cure = f"use elements of about {1e3 * enough(scene.body, h, mesh, tolerance):.2g} mm"
-    else:
+    if mesh == inf:
         elements += ", of which the file has only one mesh"
         cure = "provide a finer mesh and compare the results"
     return [

@@ -123,7 +123,8 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
 
 def _error_row(statement: Statement) -> PlanRow:
     """Return the row of the expected error: its parts, and what reduces the largest."""
-    return PlanRow(what="expected error", value=statement.words, reason=statement.cure)
+    reason = f"to lower the largest part, {statement.cure}" if statement.cure else ""
+    return PlanRow(what="expected error", value=statement.words, reason=reason)
 
 
 def _law_rows(scene: Scene, model: Model, tolerance: float) -> list[PlanRow]:
