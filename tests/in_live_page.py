@@ -14,7 +14,8 @@ USED = {
     "files": "linesCsv readMeasurement sceneToml waveformCsv waveformWav", "kernel": "respond",
     "load": "loadLines spot", "evaluate": "MAP_LINE amplitudesOf levelOf levelOver mapOf meanLevel "
     "namesOf phaseDelay pressureThresholdAt reach shareOutside spectrum thresholdAt",
-    "address": "fromAddress toAddress", "values": "STARTS check loadOf", "view3d": "openView",
+    "address": "fromAddress toAddress", "radial": "besselJ0", "values": "STARTS check loadOf",
+    "view3d": "openView",
 }  # fmt: skip
 MODULE = (
     "".join(

@@ -9,6 +9,7 @@ import pytest
 from in_browser import needs_browser
 from in_live_page import scenes_of, some_values
 from scipy.io import wavfile
+from scipy.special import jv
 
 import simple_model.load.path_cells
 from simple_model import Response, published_load, sensation_level, spectrum, threshold
@@ -172,6 +173,13 @@ def test_thresholds_spectra_and_delays(page):
     wanted = [phase_delays(*lines[:, k : k + 1], f[k : k + 1], np.zeros((1, 2)))[0, 0]
               for k in range(40)]  # fmt: skip
     np.testing.assert_allclose(page.evaluate(delay, [z.tolist(), f.tolist()]), wanted, atol=1e-12)
+
+
+def test_the_bessel_function_of_layers(page):
+    z = np.array([0.3, 7, 17.9, 18.1, 60])[:, None] + 1j * np.array([0, -2, 0.7])
+    given = [[a.real, a.imag] for a in z.ravel()]
+    found = page.evaluate("(z) => z.map(([a, b]) => besselJ0(a, b))", given)
+    np.testing.assert_allclose(np.array(found) @ [1, 1j], jv(0, z.ravel()), rtol=0, atol=3e-7)
 
 
 def test_the_highest_level_over_a_control_is_refined(page, starts):

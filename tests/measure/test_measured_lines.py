@@ -69,6 +69,14 @@ def test_delay_and_gain_are_within_their_errors_as_often_as_is_said(repetitions)
     assert 0.8 < np.median([a.chi_square for a in found]) < 1.25
 
 
+def test_phases_vary_as_much_as_their_errors_say():
+    rng = np.random.default_rng(22)
+    draws = [lines_of(measured(rng, 4, 0.2, MODEL), LINES) for _ in range(40)]
+    off = np.array([np.angle(lines.mean / MODEL) / lines.phase_error for lines in draws])
+    strong = np.abs(MODEL) > 0.2  # a phase of a weak line is not normally distributed
+    assert off[:, strong].std() == pytest.approx(1, abs=0.1)
+
+
 def test_a_delay_is_known_up_to_the_period_of_what_was_measured():
     delay = 10e-3
     model = MODEL[1:2]

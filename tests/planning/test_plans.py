@@ -247,6 +247,16 @@ def test_errors_above_the_tolerance_are_warned_of():
         assert any(" %" in warning for warning in warnings), part
 
 
+def test_the_error_of_a_time_step_is_that_of_the_motion():
+    scene = replace(BLOCK, body=replace(SMALL, sides="clamped"))
+    given = [{"h": 2e-3, "dt": dt} for dt in (1e-4, 1e-3)]
+    small, large = (plan(scene, SolveOptions(model="fem-transient", **x)).error for x in given)
+    fine, coarse = (compute(scene, "fem-transient", **x) for x in given)
+    true = compare(fine, coarse).relative_l2.max()
+    assert true > 0.05
+    assert true / 2 < large - small < 2 * true
+
+
 @pytest.mark.parametrize(("scene", "tolerance"), [(FREE, 0.1), (LAYERS, 0.05)])
 def test_stated_errors_of_small_bodies_are_true(scene, tolerance):
     stated, true = stated_and_true(scene, tolerance)

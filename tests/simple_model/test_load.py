@@ -127,6 +127,16 @@ def test_every_spot_has_the_half_width_of_the_array(height, half_width):
         assert at_half == pytest.approx(0.5, abs=0.03), focus
 
 
+@pytest.mark.parametrize(("height", "half_depth"), [(0.1, 0.014), (0.2, 0.037)])
+def test_the_pressure_above_and_below_the_focus_is_that_of_the_array(height, half_depth):
+    points = np.zeros((13, 3))
+    points[:, 2] = np.linspace(-1.5, 1.5, 13) * half_depth
+    from_array = np.abs(simple_model.array_field(points + [0, 0, height], (0, 0, height))) ** 2
+    both = (from_array + from_array[::-1]) / 2 / from_array[6]
+    pressure = MovingPressure(tacton=Tacton(), height=height)(points, 0.0).ravel()
+    np.testing.assert_allclose(pressure / pressure[6], both, atol=0.07)
+
+
 def test_the_gaussian_carries_the_force_of_the_array():
     x = np.linspace(-0.02, 0.02, 161)
     points = np.stack(np.meshgrid(x, x), axis=-1)
