@@ -12,8 +12,8 @@ from skinwave.scene.scene import BODIES
 USED = {
     "bodies": "openBody", "maps": "contours drawMap mapControls",
     "files": "linesCsv readMeasurement sceneToml waveformCsv waveformWav", "kernel": "respond",
-    "load": "loadLines spot", "evaluate": "MAP_LINE amplitudesOf levelOf levelOver mapOf meanLevel "
-    "namesOf phaseDelay pressureThresholdAt reach shareOutside spectrum thresholdAt",
+    "load": "loadLines spot", "evaluate": "MAP_LINE amplitudesOf delayOf levelOf levelOver mapOf "
+    "meanLevel namesOf phaseDelay pressureThresholdAt reach shareOutside spectrum thresholdAt",
     "address": "fromAddress toAddress", "radial": "besselJ0", "values": "STARTS check loadOf",
     "view3d": "openView",
 }  # fmt: skip
