@@ -170,6 +170,9 @@ def test_the_sag_of_any_support():
     square = replace(SMALL, width=0.1, height=0.1, material=elastic)
     simply = replace(square, mounting=Mounting(support="simply"))
     # Timoshenko and Woinowsky-Krieger (1959), tables 23 and 37.
+    two = replace(scene.tacton, foci=(0.0, 0.5))  # with half the pressure each
+    halved = replace(scene, pressure=replace(scene.pressure, tacton=two))
+    assert mean_sag(halved) == pytest.approx(mean_sag(scene), rel=1e-3)
     for body, published in ((square, 0.0056), (simply, 0.0116)):
         found = middle_compliance(body) * body.bending_stiffness / 0.1**2
         assert found == pytest.approx(published, rel=5e-3)
