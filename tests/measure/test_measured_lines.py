@@ -116,6 +116,14 @@ def test_repetitions_out_of_step_are_shifted_into_it():
     assert found.shift_error == pytest.approx(late.std(ddof=1) / np.sqrt(5), rel=0.05)
 
 
+def test_the_error_of_a_delay_includes_that_of_the_shifts():
+    each = MODEL + 0.1 * complex_noise(np.random.default_rng(8), 3, 6, 4)
+    shifts = np.array([-4e-3, 1e-3, 3e-3])  # s, standard deviation sqrt(13) ms
+    alone, both = (align(replace(only(each), shifts=x), MODEL) for x in (0 * shifts, shifts))
+    expected = np.hypot(alone.delay_error, np.sqrt(13 / 3) * 1e-3)
+    assert both.delay_error == pytest.approx(expected)
+
+
 def test_repetitions_in_step_are_left_as_they_are():
     rng = np.random.default_rng(4)
     moved = sum(bool(lines_of(measured(rng, 4, 0.3), LINES).shifts.any()) for _ in range(30))
