@@ -12,9 +12,10 @@ from skinwave.scene.scene import BODIES
 USED = {
     "bodies": "openBody", "maps": "contours drawMap mapControls",
     "files": "linesCsv readMeasurement sceneToml waveformCsv waveformWav", "kernel": "respond",
-    "load": "loadLines spot", "evaluate": "MAP_LINE amplitudesOf levelOf levelOver mapOf "
+    "load": "loadLines spot", "evaluate": "MAP_LINE amplitudesOf delayOf levelOf levelOver mapOf "
     "namesOf phaseDelay pressureThresholdAt reach shareOutside spectrum thresholdAt",
-    "address": "fromAddress toAddress", "values": "STARTS check loadOf", "view3d": "openView",
+    "address": "fromAddress toAddress", "radial": "besselJ0", "values": "STARTS check loadOf",
+    "view3d": "openView",
 }  # fmt: skip
 MODULE = (
     "".join(

@@ -112,7 +112,7 @@ def tacton_of(times: Floats, places: Floats, levels: Floats, *, hold: bool = Fal
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     """Return a tidy CSV of a scene's foci at a rate, and notes."""
-    rate = options.rate or DEVICE_RATE
+    rate = DEVICE_RATE if options.rate is None else options.rate
     if not (isfinite(rate) and 1 <= rate <= DEVICE_RATE):
         raise ValueError(f"--rate is {rate:g} Hz; devices take 1 to {DEVICE_RATE:g} Hz")
     tacton, path = scene.tacton, scene.tacton.trajectory

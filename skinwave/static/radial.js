@@ -9,7 +9,7 @@ import { drawingFrequency, gainAt, gainLines, levelFactor, loadLines, pathHarmon
   spotWidth } from "./load.js";
 
 /** Bessel function J0 of a complex argument with a positive real part: [re, im], to about 1e-7. */
-function besselJ0(a, b) {
+export function besselJ0(a, b) {
   return Math.hypot(a, b) < 18 ? seriesJ0(a, b) : asymptoticJ0(a, b);
 }
 

@@ -170,6 +170,9 @@ def test_the_sag_of_any_support():
     square = replace(SMALL, width=0.1, height=0.1, material=elastic)
     simply = replace(square, mounting=Mounting(support="simply"))
     # Timoshenko and Woinowsky-Krieger (1959), tables 23 and 37.
+    two = replace(scene.tacton, foci=(0.0, 0.5))  # with half the pressure each
+    halved = replace(scene, pressure=replace(scene.pressure, tacton=two))
+    assert mean_sag(halved) == pytest.approx(mean_sag(scene), rel=1e-3)
     for body, published in ((square, 0.0056), (simply, 0.0116)):
         found = middle_compliance(body) * body.bending_stiffness / 0.1**2
         assert found == pytest.approx(published, rel=5e-3)
@@ -240,3 +243,11 @@ def test_a_sheet_from_rest_starts_by_pressure_over_mass(losses):
     found = named("plate-modes-transient").solve(scene, times, SolveOptions()).values[0]
     pressed = scene.pressure(np.array([[0.0, 0.0, 0.0], [0.005, 0.0, 0.0]]), 0.0)
     np.testing.assert_allclose(found, pressed / 0.16, rtol=0.03)
+
+
+def test_modes_that_loss_couples_are_at_rest_at_first():
+    body = replace(SMALL, material=replace(PAPER, loss_factor=0.3), mounting=TWO)
+    load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05))
+    scene = Scene(pressure=load, body=body, probes=((0.005, 0.0),))
+    motion = named("plate-modes-transient").solve(scene, np.arange(500) / 1e4, SolveOptions())
+    assert np.abs(motion.values[0]).max() < 1e-6 * np.abs(motion.values).max()

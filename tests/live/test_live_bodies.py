@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from in_browser import needs_browser
 
-from simple_model import Rhythm, sensation_level
+from simple_model import MovingPressure, Rhythm, Tacton, from_young, sensation_level
 from simple_model.load.line_names import during_pulses
+from skinwave.bodies.supports import Mounting
 from skinwave.live import elements
 from skinwave.live.elements import BAND, element_pack
 from skinwave.live.packs import pack_of
 from skinwave.live.records import record_of
 from skinwave.live.selftest import HIGHEST, SMALLEST, exact, random_scene
 from skinwave.live.values import control_values
-from skinwave.scene.scene import BODIES
+from skinwave.planning.simulate import compute
+from skinwave.scene.scene import BODIES, Scene
 
 pytestmark = needs_browser
 
@@ -27,9 +29,10 @@ ANSWER = """({ name, values }) => {
 }"""
 PLACES = """({ name, values, k }) => {
   const motion = bodies[name].respond(loadOf(values)), n = MAP_LINE.length;
-  const { re } = motion.onGrid(MAP_LINE, MAP_LINE);
-  const at = motion.at(MAP_LINE[k % n], MAP_LINE[Math.floor(k / n)]).re;
-  return [...motion.f].map((_, l) => [re[l * n * n + k], at[l]]);
+  const map = motion.onGrid(MAP_LINE, MAP_LINE);
+  const at = motion.at(MAP_LINE[k % n], MAP_LINE[Math.floor(k / n)]);
+  return ["re", "im"].flatMap((own) => [...motion.f].map((_, l) => (
+    [map[own][l * n * n + k], at[own][l]])));
 }"""
 LEVEL = """({ name, values }) => {
   const motion = bodies[name].respond(loadOf(values));
@@ -91,6 +94,22 @@ def test_lines_waveforms_and_maps_of_layers_and_sheets(page, name):
     given = {"name": name, "values": control_values(made[0], name), "k": 45 * 19 + 28}
     pairs = np.array(page.evaluate(PLACES, given))
     assert np.abs(pairs[:, 0] - pairs[:, 1]).max() < 5e-3 * np.abs(pairs).max()
+
+
+def test_a_stretched_sheet_under_ramps_starts_from_rest(page):
+    stretched = Mounting(tension_x=30.0, tension_y=10.0)
+    lossy = from_young(density=800, young=2e9, poisson=0.3, loss_factor=0.3)
+    body = replace(BODIES["paper-sheet"], width=0.05, height=0.05, material=lossy, air=False,
+                   mounting=stretched)  # fmt: skip
+    page.evaluate(OPEN, record_of(body, pack_of(body), "stretched", waves=False))
+    rhythm = Rhythm(pulses=((0.03, 0.02),), ramp=0.01)
+    for given in ({}, {"rhythm": rhythm}):
+        load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, **given))
+        scene = Scene(pressure=load, body=body, probes=((0.005, 0.0),))
+        u = np.array(answer(page, "stretched", scene)["u"])
+        exactly = compute(scene, "plate-modes-transient").values[:, 0]
+        assert abs(u[0]) < 1e-3 * np.abs(u).max()
+        assert np.linalg.norm(u - exactly) < 0.02 * np.linalg.norm(exactly)
 
 
 def test_a_body_of_elements(page, monkeypatch):

@@ -1,5 +1,6 @@
 """Controls, loads, kernel, numbers and files of the live page in a browser, beside Python."""
 
+import csv
 import re
 from dataclasses import replace
 from io import BytesIO
@@ -9,6 +10,7 @@ import pytest
 from in_browser import needs_browser
 from in_live_page import scenes_of, some_values
 from scipy.io import wavfile
+from scipy.special import jv
 
 import simple_model.load.path_cells
 from simple_model import Response, published_load, sensation_level, spectrum, threshold
@@ -176,6 +178,29 @@ def test_thresholds_spectra_and_delays(page):
     np.testing.assert_allclose(page.evaluate(delay, [z.tolist(), f.tolist()]), wanted, atol=1e-12)
 
 
+def test_the_delay_is_that_of_the_strongest_line_where_its_pressure_is_largest(page, starts):
+    own = starts | {"shape": "circle", "size": 20, "speed": 6}
+    found = page.evaluate(
+        """(own) => {
+          const f = [50, 80], wave = (size, delay) => ({ re: f.map((at, l) => size[l]
+            * Math.cos(2 * Math.PI * at * delay)), im: f.map((at, l) => -size[l]
+            * Math.sin(2 * Math.PI * at * delay)) });
+          const kernel = { f, at: (x) => wave([2, 1 + 50 * x], 0) };
+          const waves = { f, at: (x) => wave([1, 2], 1e-3 + 0.1 * x) };
+          return delayOf(kernel, waves, loadOf(own));
+        }""",
+        own,
+    )
+    assert found == {"delay": pytest.approx(2e-3), "f": 80}
+
+
+def test_the_bessel_function_of_layers(page):
+    z = np.array([0.3, 7, 17.9, 18.1, 60])[:, None] + 1j * np.array([0, -2, 0.7])
+    given = [[a.real, a.imag] for a in z.ravel()]
+    found = page.evaluate("(z) => z.map(([a, b]) => besselJ0(a, b))", given)
+    np.testing.assert_allclose(np.array(found) @ [1, 1j], jv(0, z.ravel()), rtol=0, atol=3e-7)
+
+
 def test_the_highest_level_over_a_control_is_refined(page, starts):
     own = starts | {"am": 0, "shape": "circle", "size": 20, "x": 10, "y": 0, "body": "none"}
     found = page.evaluate(
@@ -240,11 +265,27 @@ def test_tables_and_sound(page, starts, tmp_path):
     assert {"f_AM", "f_d", "f_d-f_AM"} <= {row.split(",")[0] for row in rows}
 
 
+def test_levels_of_lines_are_those_of_displacement_in_any_quantity(page, starts):
+    tables = page.evaluate(
+        f"(many) => many.map((own) => linesCsv(({ANSWER})(own)))",
+        [starts | {"quantity": each} for each in ("displacement", "velocity")],
+    )
+    still, moving = ({row[1]: row for row in csv.reader(each.splitlines()[1:])} for each in tables)
+    pairs = [(still[f], moving[f]) for f in still.keys() & moving.keys() if still[f][4]]
+    assert len(pairs) > 3
+    for (_, f, metre, pressure, level), (_, _, speed, *others) in pairs:
+        assert others == [pressure, level]
+        assert float(speed) == pytest.approx(2e-3 * np.pi * float(f) * float(metre), rel=1e-7)
+        expected = sensation_level(1e-6 * float(metre), float(f))
+        assert float(level) == pytest.approx(expected, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("header", "mark", "quantity"),
     [
         ("t [s],displacement(0,0) [m],displacement(10,-5) [m]", ",", "displacement"),
         ("Time (ms);Velocity (mm/s);Velocity 2 (mm/s)", ";", "velocity"),
+        ("t [ms],u(0,1) [µm],u(1,0) [µm]", ",", "displacement"),
         ("# from a vibrometer\ntime [s]\ta [m/s²]\tb [m/s²]", "\t", "acceleration"),
     ],
 )

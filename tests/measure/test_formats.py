@@ -377,6 +377,7 @@ def test_units_of_motion():
         ("mm/s", "velocity", 1e3), ("mm s^-1", "velocity", 1e3), ("m·s⁻¹", "velocity", 1.0),
         ("m/s²", "acceleration", 1.0), ("m/s^2", "acceleration", 1.0),
         ("m/s/s", "acceleration", 1.0), ("g", "acceleration", 1 / 9.80665),
+        ("mg", "acceleration", 1e3 / 9.80665),
         ("20 mm/s", "velocity", 50.0), ("1e-3 m/s", "velocity", 1e3),
     ):  # fmt: skip
         assert quantity_of(unit) == kind, unit

@@ -135,6 +135,15 @@ def test_a_model_that_misfits_has_a_delay_at_which_the_record_lies_within_the_ta
     assert any("107 of the 500 ms" in text for text in measured_page.remarks(far))
 
 
+def test_the_overlap_of_a_record_that_begins_before_the_tacton():
+    rows = np.arange(500) / 1e3
+    given = {"times": rows, "values": np.sin(rows)[None, :, None]}
+    measured = Measurement(quantity="velocity", places=np.zeros((1, 2)), **given)
+    run = SimpleNamespace(response=SimpleNamespace(times=np.arange(1000) / 1e3))
+    found = [comparison.overlap(measured, run, delay) for delay in (0.4, 0.0, -0.8)]
+    np.testing.assert_allclose(found, [0.099, 0.499, 0.199])
+
+
 def test_differences_within_the_numerical_error_are_marked(models):
     rng = np.random.default_rng(2)
     rough = [replace(run, response=replace(run.response, expected_error=0.5))

@@ -69,6 +69,14 @@ def test_delay_and_gain_are_within_their_errors_as_often_as_is_said(repetitions)
     assert 0.8 < np.median([a.chi_square for a in found]) < 1.25
 
 
+def test_phases_vary_as_much_as_their_errors_say():
+    rng = np.random.default_rng(22)
+    draws = [lines_of(measured(rng, 4, 0.2, MODEL), LINES) for _ in range(40)]
+    off = np.array([np.angle(lines.mean / MODEL) / lines.phase_error for lines in draws])
+    strong = np.abs(MODEL) > 0.2  # a phase of a weak line is not normally distributed
+    assert off[:, strong].std() == pytest.approx(1, abs=0.1)
+
+
 def test_a_delay_is_known_up_to_the_period_of_what_was_measured():
     delay = 10e-3
     model = MODEL[1:2]
@@ -116,6 +124,14 @@ def test_repetitions_out_of_step_are_shifted_into_it():
     assert np.abs(found.shifts - (late - late.mean())).max() < 2e-5
     assert np.abs(np.abs(found.mean) - np.abs(truth)).max() < 0.02
     assert found.shift_error == pytest.approx(late.std(ddof=1) / np.sqrt(5), rel=0.05)
+
+
+def test_the_error_of_a_delay_includes_that_of_the_shifts():
+    each = MODEL + 0.1 * complex_noise(np.random.default_rng(8), 3, 6, 4)
+    shifts = np.array([-4e-3, 1e-3, 3e-3])  # s, standard deviation sqrt(13) ms
+    alone, both = (align(replace(only(each), shifts=x), MODEL) for x in (0 * shifts, shifts))
+    expected = np.hypot(alone.delay_error, np.sqrt(13 / 3) * 1e-3)
+    assert both.delay_error == pytest.approx(expected)
 
 
 def test_repetitions_in_step_are_left_as_they_are():

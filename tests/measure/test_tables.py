@@ -1,9 +1,12 @@
 """Tables as instruments and programs export them: frequency, amplitude and phase come back."""
 
+from datetime import datetime, timedelta
+
 import numpy as np
 import pytest
 
 from skinwave.measure.reading import parse_places, read
+from skinwave.measure.text import parse_table
 
 RATE, COUNT, START = 10_000.0, 1200, -0.02
 T = START + np.arange(COUNT) / RATE
@@ -130,6 +133,22 @@ def test_tables_of_clocks_and_of_no_times(tmp_path):
     for name, text in CLOCKED.items():
         (tmp_path / f"{name}.csv").write_text(text)
         assert_tone(read(tmp_path / f"{name}.csv"), first=0.0)
+
+
+@pytest.mark.parametrize("hour", [9, 23])
+def test_clocks_go_on_after_a_full_hour_and_after_midnight(hour):
+    times = 0.025 * np.arange(40)
+    first = datetime(2026, 1, 5, hour, 59, 59, 500_000)
+    rows = (f"{(first + timedelta(seconds=t)).isoformat(timespec='microseconds')},1" for t in times)
+    table = parse_table("\n".join(["time,v [mm/s]", *rows]))
+    np.testing.assert_allclose(table.numbers[:, 0], times, atol=1e-9)
+
+
+def test_a_given_rate_counts_the_samples_before_the_first_too(tmp_path):
+    rows = "".join(f"{2 + k / 1e3:.3f},{k % 7}\n" for k in range(100))
+    (tmp_path / "a.csv").write_text(f"time [s],v [mm/s]\n{rows}")
+    found = read(tmp_path / "a.csv", rate=500.0)
+    np.testing.assert_allclose(found.times[[0, -1]], [4.0, 4.198])
 
 
 def test_channels_in_volts_are_not_taken_as_places_of_motion(tmp_path):

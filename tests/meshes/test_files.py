@@ -13,6 +13,7 @@ import pyvista
 
 import meshes
 from meshes import MeshError, TetMesh
+from meshes.files.cells import contents
 from meshes.files.mesh_files import read_contents
 from meshes.surface.repair import check
 from meshes.surface.triangulation import volume
@@ -626,3 +627,30 @@ def test_errors_of_the_mesh_command_are_one_line(tmp_path, monkeypatch, capsys):
         assert line.count("\n") == 1
         assert re.search(said, line), line
         assert sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+def test_voxels_are_split_as_the_hexahedra_that_they_are(tmp_path, read_here):
+    grid = pyvista.ImageData(dimensions=(3, 3, 3), spacing=(1.0, 2.0, 3.0))
+    grid.cast_to_unstructured_grid().save(tmp_path / "voxels.vtu")
+    mesh = meshes.read(tmp_path / "voxels.vtu", unit="in")
+    assert meshes.corner_volumes(mesh.points, mesh.tets).sum() == pytest.approx(48 * 0.0254**3)
+
+
+def test_negative_families_of_cells_are_regions_with_names():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1.0]])
+    raw = meshio.Mesh(
+        points, [("tetra", np.array([[0, 1, 2, 3], [0, 2, 1, 4]]))],
+        cell_data={"cell_tags": [np.array([-6, -7])]},
+        info={"notes": [], "names": {-6: "skin", -7: "bone"}},
+    )  # fmt: skip
+    found = contents(Path("a.med"), raw)
+    assert (found.region.tolist(), found.names) == ([6, 7], {6: "skin", 7: "bone"})
+
+
+def test_any_order_of_nodes_on_edges_becomes_that_of_vtk():
+    mesh = meshes.block((1.0, 1.0, 1.0), 0.5)
+    order = [0, 1, 2, 3, 6, 4, 5, 9, 7, 8]  # cyclic, so that its inverse is another one
+    raw = meshio.Mesh(mesh.points, [("tetra10", mesh.tets[:, order])],
+                      info={"notes": [], "names": {}})  # fmt: skip
+    found = contents(Path("a.vtu"), raw)
+    np.testing.assert_array_equal(found.points[found.tets], mesh.points[mesh.tets])

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pattern_files import STEP, adaptics, brush, jump, keyframe, stop
+from pattern_files import STEP, adaptics, brush, f64, jump, keyframe, stop
 from scipy.io import wavfile
 
 from simple_model import MovingPressure, Rhythm, Tacton, Trajectory
@@ -30,6 +30,10 @@ WRONG_COMMANDS = (
     "good.wav out.toml --role envelope",
 )  # fmt: skip
 POINT = brush(radius=0.0)
+FADING = Trajectory(
+    shape="recorded", points=((0, 0), (0.01, 0), (0, 0.01)), times=(0.0, 0.05, 0.1),
+    levels=(1.0, 0.4, 0.7),
+)  # fmt: skip
 BACK = jump("near", "lt", 1.0, 0.0)
 CIRCUIT = [
     keyframe(0, LEFT, POINT),
@@ -118,6 +122,16 @@ def test_a_lissajous_is_recorded_as_the_engine_draws_it(tmp_path):
     expected = np.stack([0.010 * np.sin(2 * u + 0.5), 0.006 * np.sin(3 * u)], -1)
     np.testing.assert_allclose(scene.tacton.trajectory.position(t), expected, atol=2e-5)
     assert any("20000 Hz" in note for note in notes)
+
+
+def test_places_are_scaled_then_turned_then_moved(tmp_path):
+    placed = {
+        "translate": {"x": f64(1.0), "y": f64(2.0), "z": f64(180.0)}, "rotation": f64(90.0),
+        "scale": {"x": f64(1.0), "y": f64(2.0), "z": f64(1.0)},
+    }  # fmt: skip
+    table = adaptics(keyframe(0, (3.0, 4.0), POINT), geometric_transforms=placed)
+    (centre,) = {imported(tmp_path, table)[0].tacton.trajectory.centre}
+    assert centre == pytest.approx((-7e-3, 5e-3))
 
 
 @pytest.mark.parametrize(
@@ -225,6 +239,7 @@ def test_what_adaptics_has_no_words_for_is_said():
         (Tacton(amplitude=0.6, trajectory=CIRCLE, duration=0.1), "linear"),
         (Tacton(rhythm=Rhythm(pulses=((0.02, 0.01),)), duration=0.1), "force_corrected"),
         (Tacton(foci=(0.0, 0.25, 0.5), trajectory=CIRCLE, duration=0.1), "pressure_squared"),
+        (Tacton(trajectory=FADING, duration=0.1), "pressure_squared"),
     ],
 )
 def test_csv_carries_the_load_of_any_tacton(tmp_path, tacton, drive):
@@ -287,7 +302,11 @@ def test_the_script_states_its_frequency_and_holds_its_foci():
         radii = np.linalg.norm(eval_list(script, "PLACES"), axis=2)
         np.testing.assert_allclose(radii, 10.0, atol=1e-3)
         assert radii.shape[1] == foci
-        assert max(eval_list(script, "MODULATION")) == 255
+        sound = eval_list(
+            script, "MODULATION"
+        )  # 255 (1 + sin) / 2, of which the load is the square
+        assert max(sound) == 255
+        assert np.mean(sound) == pytest.approx(127.5, abs=1)
 
 
 def eval_list(script, name):

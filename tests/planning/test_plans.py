@@ -1,24 +1,29 @@
 """Plans: model, extent, mesh and stated error of a scene, and of the start from rest."""
 
+import re
 import warnings
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from corpus import FREE, SHORT
 
+import skinwave.planning.extent
 from bench.plans import MOST, stated_and_true
 from simple_model import Material, MovingPressure, Tacton, Trajectory
 from skinwave import SkinwaveWarning, loads, simulate
 from skinwave.bodies.build import build
 from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
+from skinwave.bodies.slab import discretise
 from skinwave.bodies.supports import Mounting
 from skinwave.models import named
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
-from skinwave.planning.estimates import side_reflections
+from skinwave.planning.estimates import cutoff_frequency, side_reflections
+from skinwave.planning.extent import absorbing_error, extent
 from skinwave.planning.plan import plan
-from skinwave.planning.refinement import SizeController, refine
+from skinwave.planning.refinement import SizeController, above_band, element_sizes, refine
 from skinwave.planning.simulate import compute
 from skinwave.results.comparison import compare
 from skinwave.scene.scene import BODIES, Body, Layer, Scene, Sides
@@ -242,9 +247,57 @@ def test_errors_above_the_tolerance_are_warned_of():
         ({"model": "fem-transient", "dt": 4e-3, "h": 0.01}, "time step of 4 ms"),
         ({"model": "fem-harmonic", "h": 0.005}, "initial transient"),
     ]:
-        warnings = plan(scene, SolveOptions(tolerance=0.1, **arguments)).warnings
-        assert any(part in warning for warning in warnings), part
-        assert any(" %" in warning for warning in warnings), part
+        found = plan(scene, SolveOptions(tolerance=0.1, **arguments))
+        assert found.error > 0.1, part
+        (warning,) = (each for each in found.warnings if part in each)
+        assert re.search(r"[\d.]+ (%|times|mm)", warning), part
+
+
+def test_the_error_of_a_time_step_is_that_of_the_motion():
+    scene = replace(BLOCK, body=replace(SMALL, sides="clamped"))
+    given = [{"h": 2e-3, "dt": dt} for dt in (1e-4, 1e-3)]
+    small, large = (plan(scene, SolveOptions(model="fem-transient", **x)).error for x in given)
+    fine, coarse = (compute(scene, "fem-transient", **x) for x in given)
+    true = compare(fine, coarse).relative_l2.max()
+    assert true > 0.05
+    assert true / 2 < large - small < 2 * true
+
+
+def test_the_error_of_absorbing_sides_is_the_change_with_a_wide_layer():
+    scene = replace(LAYER, body=Body(width=0.03, height=0.03, depth=8e-3))
+    options = SolveOptions(h=float(element_sizes(scene.body)[0]))
+    usual, wide = (
+        answer(prepare(scene, options, discretise=partial(discretise, wider=x)), scene)
+        for x in (1.0, 4.0)
+    )
+    true = compare(wide, usual).relative_l2.max()
+    assert true > 1e-4
+    assert true < absorbing_error(scene, scene.body) < 3 * true
+
+
+def test_absorbing_ends_move_out_by_the_width_of_their_layer(monkeypatch):
+    monkeypatch.setattr(skinwave.planning.extent, "absorbing_error", lambda *given: 1.0)
+    monkeypatch.setattr(skinwave.planning.extent, "check_mesh", lambda *given: None)
+    body = Body(width=0.03, height=0.04, depth=8e-3, base="absorbing")
+    larger, (row,), _ = extent(replace(LAYER, body=body), SolveOptions(), 200.0)
+    sides = [larger.width - body.width, larger.height - body.height]
+    assert larger.depth > body.depth + 1e-3
+    np.testing.assert_allclose(sides, 2 * (larger.depth - body.depth))
+    assert row.what == "extent"
+
+
+def test_lines_beyond_a_third_of_the_tolerance_are_left_out():
+    shares = np.array([[0.95, 0.9799], [0.04, 0.0], [0.0099, 0.02], [0.0001, 0.0001]])
+    frequencies = np.array([0.0, 100.0, 200.0, 300.0])
+    found = [cutoff_frequency(frequencies, shares, x) for x in (0.02, 0.2, 0.5, 1.0)]
+    assert found == [300, 200, 100, 0]
+
+
+def test_motion_above_the_band_is_an_error_of_twice_its_energy():
+    t, share = (np.arange(1000) + 0.5) / 1e4, 0.1
+    low, high = (np.cos(2 * np.pi * f * t) for f in (200, 3000))
+    found = above_band(np.column_stack([low, low + np.sqrt(share) * high]), 1e-4)
+    assert found == pytest.approx(np.sqrt(2 * share / (1 + share)), rel=1e-6)
 
 
 @pytest.mark.parametrize(("scene", "tolerance"), [(FREE, 0.1), (LAYERS, 0.05)])

@@ -16,9 +16,9 @@ from skinwave.report.maps import rms_text
 from skinwave.results import surface
 from skinwave.results.claims import evaluate
 from skinwave.results.comparison import compare, steady_lines, steady_rms
-from skinwave.results.propagation import propagation, share_outside
+from skinwave.results.propagation import mach_angle, propagation, share_outside
 from skinwave.results.run import Run
-from skinwave.results.surface import body_map, grid, kernel_map
+from skinwave.results.surface import SurfaceField, body_map, grid, kernel_map
 from skinwave.scene.file import read
 from skinwave.scene.paper15 import beside_kernels, tactons
 from skinwave.scene.scene import BODIES, Body, Scene, with_body
@@ -224,6 +224,40 @@ def test_the_first_screen_has_a_verdict_and_four_numbers():
     assert share[1:] == ["0 %", f"{100 * found.share:.0f} %"]
     assert delay[1] == "0 ms"
     assert float(delay[2].removesuffix(" ms")) == pytest.approx(1e3 * found.delay, rel=0.05)
+
+
+def test_spread_reach_and_delay_of_a_known_motion():
+    load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.5))
+    scene = Scene(pressure=load, body=Body(), probes=((0.004, 0.0), (0.0, 0.0)))
+    times = np.arange(5000) / 1e4
+    later = times[:, None] - [2e-3, 1e-3]
+    motion = Response(
+        model="known", times=times, probes=scene.probe_points,
+        values=1e-6 * np.sin(2 * pi * 140 * later),
+    )  # fmt: skip
+    kernel, run = (
+        Run(tacton="one", body=body, scene=scene, response=response)
+        for body, response in (("none", compute(scene, "point-kernel")), ("slab", motion))
+    )
+    x = 5e-4 * np.arange(-40, 41)
+    away = 1e3 * np.hypot(*np.meshgrid(x, x))  # mm
+    # 2 dB less for each millimetre, or 4 dB; 13 dB above the threshold in the middle.
+    surface = SurfaceField(x=x, y=x, rms=10 ** (-away / 10), level=13 - 2 * away)
+    narrow = SurfaceField(x=x, y=x, rms=10 ** (-away / 5))
+    found = propagation(run, kernel, surface, narrow)
+    assert found.delay == pytest.approx(1e-3, abs=1e-5)
+    assert 1e3 * found.spread.metre == pytest.approx(3, abs=0.26)
+    assert 1e3 * found.kernel_spread.metre == pytest.approx(1.5, abs=0.26)
+    reaches = [1e3 * reach.metre for reach in found.above_threshold]
+    np.testing.assert_allclose(reaches, [3.49, 6.5, 9.51], atol=0.26)
+    assert not any(reach.beyond for reach in found.above_threshold)
+    near_edge = SurfaceField(x=x, y=x, rms=surface.rms, level=40 - 2 * away)
+    assert propagation(run, kernel, near_edge, narrow).above_threshold[1].beyond
+    outside = narrow.rms < 0.1
+    share = (surface.rms[outside] ** 2).sum() / (surface.rms**2).sum()
+    assert found.share == pytest.approx(share)
+    assert mach_angle(6.0, 12.0) == pytest.approx(pi / 6)
+    assert mach_angle(6.0, 5.0) is None
 
 
 def test_a_constant_pressure_at_rest_moves_nothing():

@@ -120,11 +120,27 @@ def test_the_array_makes_the_published_table():
     np.testing.assert_allclose(p / p[0], table, atol=0.001)
 
 
+def test_far_from_the_array_all_pressures_add():
+    (found,) = np.abs(simple_model.array_field([[0.0, 0.0, 20.0]], (0, 0, 20.0)))
+    lost = 10 ** (-1.32 * 20 / 20)  # dB/m, ISO 9613-1
+    assert found == pytest.approx(256 * 3.4 / 20 * lost, rel=1e-3)
+
+
 @pytest.mark.parametrize(("height", "half_width"), [(0.1, 3.2), (0.3, 7.3)])
 def test_every_spot_has_the_half_width_of_the_array(height, half_width):
     for focus in ("main_lobe", "gaussian", "array"):
         at_half = focal_spot(on_axis(np.array([half_width])), height, focus)
         assert at_half == pytest.approx(0.5, abs=0.03), focus
+
+
+@pytest.mark.parametrize(("height", "half_depth"), [(0.1, 0.014), (0.2, 0.037)])
+def test_the_pressure_above_and_below_the_focus_is_that_of_the_array(height, half_depth):
+    points = np.zeros((13, 3))
+    points[:, 2] = np.linspace(-1.5, 1.5, 13) * half_depth
+    from_array = np.abs(simple_model.array_field(points + [0, 0, height], (0, 0, height))) ** 2
+    both = (from_array + from_array[::-1]) / 2 / from_array[6]
+    pressure = MovingPressure(tacton=Tacton(), height=height)(points, 0.0).ravel()
+    np.testing.assert_allclose(pressure / pressure[6], both, atol=0.07)
 
 
 def test_the_gaussian_carries_the_force_of_the_array():
@@ -149,10 +165,11 @@ def test_relative_intensity_is_the_force_of_the_array_on_a_disc():
         )
 
 
-def amplitudes(drive, amplitude=1.0):
+def amplitudes(drive, amplitude=1.0, depth=1.0):
     """Mean and amplitudes at f, 2f, 3f of the load at the focus, AM at f."""
     tacton = Tacton(amplitude=amplitude, am_frequency=100)
-    load = MovingPressure(tacton=tacton, drive=drive, peak_pressure=1.0)
+    load = MovingPressure(tacton=tacton, drive=drive, peak_pressure=1.0,
+                          depth_of_modulation=depth)  # fmt: skip
     bins = np.abs(np.fft.rfft(load.gain(np.arange(400) / 40000))) / 400
     return bins[:4] * [1, 2, 2, 2]
 
@@ -160,6 +177,8 @@ def amplitudes(drive, amplitude=1.0):
 def test_drive_laws_have_the_lines_of_their_formulas():
     np.testing.assert_allclose(amplitudes("linear"), [0, 1, 0, 0], atol=1e-12)
     np.testing.assert_allclose(amplitudes("force_corrected"), [0.5, 0.5, 0, 0], atol=1e-12)
+    half = amplitudes("force_corrected", depth=0.5)  # (1 + M / 2) / 1.5
+    np.testing.assert_allclose(half, [2 / 3, 1 / 3, 0, 0], atol=1e-12)
     np.testing.assert_allclose(amplitudes("pressure_squared"), [0.375, 0.5, 0.125, 0], atol=1e-12)
 
 
@@ -189,3 +208,6 @@ def test_a_line_at_its_threshold_has_level_zero():
     assert simple_model.sensation_level(threshold(140), 140) == pytest.approx(0)
     assert simple_model.sensation_level(10 * threshold(140), 140) == pytest.approx(20)
     assert simple_model.sensation_level(0.0, 140) == -np.inf
+    # Full AM at 200 Hz up to 4.4 Pa has a line of 2.2 Pa there.
+    assert simple_model.sensation_level(2.2, 200, unit="Pa") == pytest.approx(0)
+    assert simple_model.sensation_level(1.1, 200, unit="Pa") == pytest.approx(-6.02, abs=0.01)

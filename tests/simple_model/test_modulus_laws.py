@@ -19,6 +19,7 @@ from simple_model.load.sampling import highest_line
 from simple_model.load.spectrum import load_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.models.laws import relaxing
+from skinwave.planning import left_out
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads, read
 from skinwave.scene.scene import Body, Scene
@@ -122,6 +123,19 @@ def test_the_expected_error_of_a_plan_includes_the_series():
     away = np.linalg.norm(series - steady, axis=0) / np.linalg.norm(steady, axis=0)
     assert found.error > 0.95 * away.max() > 0.01
     assert rough.law.series.words in {row.value for row in found.rows}
+
+
+def test_an_error_of_the_modulus_is_amplified_as_the_motion_of_a_bounded_body(monkeypatch):
+    away, loss = 1e-3, PronyTerm(modulus=3e3, time=1e-3)
+    solid = Material(density=1070, shear_modulus=25e3, poisson=0.49, prony=(loss,))
+    stiffer = replace(solid, shear_modulus=25e3 * (1 + away), prony=(
+        replace(loss, modulus=3e3 * (1 + away)),))  # fmt: skip
+    own, other = (scene(table_of(each), am_frequency=260) for each in (solid, stiffer))
+    a, b = (compute(each, "fem", h=6e-3).displacement for each in (own, other))
+    change = (np.linalg.norm(b - a, axis=0) / np.linalg.norm(a, axis=0)).max()
+    monkeypatch.setattr(left_out, "_series_deviation", lambda *given: away)
+    assert change > 4 * away
+    assert left_out.series_error(own, "fem", 0.1) == pytest.approx(change, rel=0.15)
 
 
 def test_a_load_beyond_a_table_is_refused():

@@ -8,7 +8,7 @@ import pytest
 import simple_model
 from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, joined, point_kernel
 from simple_model.load.path_cells import path_fourier, path_samples
-from simple_model.load.spectrum import load_lines
+from simple_model.load.spectrum import load_lines, path_forces
 from skinwave import Body, Scene
 from skinwave.planning.plan_warnings import rhythm_unresolved
 from skinwave.planning.simulate import compute
@@ -52,6 +52,22 @@ def test_gaps_have_no_pressure(drive):
     plain = replace(tacton, rhythm=None)
     same = point_kernel(MovingPressure(tacton=plain, drive=drive), PLACES, TIMES).displacement
     np.testing.assert_array_equal(x[on], same[on])
+
+
+def test_levels_are_linear_in_ramps_and_between_samples():
+    ramped = Rhythm(pulses=((0.010, 0.006),), ramp=0.002)
+    found = ramped.level([0.001, 0.005, 0.009, 0.0095, 0.012, 0.017])
+    np.testing.assert_allclose(found, [0.5, 1, 0.5, 0.25, 0, 0.5], atol=1e-9)
+    signal = Signal(rate=100, samples=(0.0, 1.0, 0.5))
+    np.testing.assert_allclose(signal.at([0, 0.005, 0.01, 0.025, 0.035]), [0, 0.5, 1, 0.25, 0.5])
+
+
+def test_forces_on_a_grid_are_the_integral_of_the_focal_spot():
+    line = 5e-4 * np.arange(-80, 81)
+    points = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+    areas = np.full((len(points), 1), 5e-4**2)
+    found = path_forces(MovingPressure(tacton=Tacton()), points, areas)
+    assert found[0, 0] == pytest.approx(2 * np.pi * 0.00435**2, rel=1e-6)
 
 
 def test_pulses_make_lines_of_their_period():

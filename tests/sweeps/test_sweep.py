@@ -8,15 +8,16 @@ import pytest
 
 import fem.affine
 import fem.krylov
-from simple_model import MovingPressure, Tacton
+from simple_model import Effort, MovingPressure, Response, Tacton, sensation_level
 from skinwave.commands.cli import main
 from skinwave.models import covering
 from skinwave.models.free_keys import free_keys, with_values
 from skinwave.models.options import SolveOptions
 from skinwave.scene.file import read, to_table
 from skinwave.scene.scene import BODIES, Body, Layer, Scene, without_tacton
-from skinwave.scene.variation import cases_of, combinations, parse
+from skinwave.scene.variation import DesignPoint, cases_of, combinations, parse
 from skinwave.sweeps import dataset, reductions
+from skinwave.sweeps.measures import input_columns, result_columns
 
 SMALL = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
 ON_SMALL = [*SMALL, "tacton.duration_s=0.3", "--model", "fem", "--element-size", 7, "--workers", 1]
@@ -47,6 +48,43 @@ def test_rows_have_inputs_and_results(scene):
     assert waves["drawing_frequency_hz"] == pytest.approx(waves["tacton.speed_m_per_s"] / 0.0314159)
     Path("again.toml").write_text(waves["scene"])
     assert read("again.toml").tacton.trajectory.speed == waves["tacton.speed_m_per_s"]
+
+
+def test_columns_of_a_known_motion():
+    f, delay, amplitudes = 140.0, 1e-3, np.array([1.0, 0.2, 0.15])  # Hz, s, um
+    probes = ((0.0, 0.0), (0.005, 0.0), (0.01, 0.0))
+    load = MovingPressure(tacton=Tacton(am_frequency=f, duration=0.5))
+    scene = Scene(pressure=load, body=Body(), probes=probes)
+    times = np.arange(5000) / 1e4
+    pressure = load(scene.probe_points, times)
+    phase = 2 * np.pi * f * (times - delay)
+    values = 1e-6 * (amplitudes * np.sin(phase)[:, None] - 0.3)
+    values[:20] *= 10  # left out of the largest value
+    response = Response(
+        model="known", times=times, probes=np.array(probes), values=values,
+        effort=Effort(peak_memory=3 * 2**30),
+    )  # fmt: skip
+    row = result_columns(scene, response)
+    scale = (pressure * values).sum() / (values**2).sum()
+    misfit = np.linalg.norm(scale * values - pressure, axis=0) / np.linalg.norm(pressure, axis=0)
+    kernel = 50 / 2 * np.exp(-(scene.probe_points[:, 0] ** 2) / 2 / 0.00435**2)
+    lines = {"f_AM_um": amplitudes, "f_AM_ratio": abs(scale) * 1e-6 * amplitudes / kernel,
+             "level_db": sensation_level(1e-6 * amplitudes, f)}  # fmt: skip
+    for name, expected in lines.items():
+        np.testing.assert_allclose(row[name], expected, rtol=1e-3, err_msg=name)
+    found = [row[f"{part}_{drop}db_mm"] for part in ("kernel_spread", "spread") for drop in (6, 20)]
+    np.testing.assert_allclose(found, [5, 5, 0, 10])
+    np.testing.assert_allclose(row["peak_um"], 0.3 + amplitudes, rtol=1e-3)
+    np.testing.assert_allclose(row["rms_um"], amplitudes / np.sqrt(2), rtol=1e-3)
+    np.testing.assert_allclose(row["kernel_delay_ms"], 1e3 * delay, atol=0.02)
+    np.testing.assert_allclose(row["kernel_misfit"], misfit, rtol=1e-6)
+    # The squared pressure has a line at 2 f, a quarter of that at f.
+    np.testing.assert_allclose(row["kernel_shape_misfit"], np.sqrt(1 / 17), rtol=2e-3)
+    assert (row["f_AM_hz"], row["sensation_line"], row["peak_memory_gib"]) == (f, "f_AM", 3)
+    known = input_columns(DesignPoint(varied={}, keys={}, text="", scene=scene))
+    # Of an incompressible half-space it is 0.955 times the speed of shear waves.
+    assert known["rayleigh_speed_m_per_s"] == pytest.approx(0.955 * 5, rel=2e-3)
+    assert (known["probe_x_mm"], known["probe_y_mm"]) == ([0, 5, 10], [0, 0, 0])
 
 
 def test_a_failing_combination_is_a_row_with_its_error(scene, capsys):
