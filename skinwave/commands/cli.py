@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 import skinwave
-from simple_model.choices import SHORTEST_PART, suggestion
 from skinwave.commands import COMMANDS
 from skinwave.commands.common import note_scenes
 from skinwave.system import extensions
@@ -95,6 +94,8 @@ class _Parser(argparse.ArgumentParser):
         """Refuse unknown options in the parser of their command, which knows similar ones."""
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
+            from simple_model.choices import SHORTEST_PART, suggestion
+
             given = unknown[0].partition("=")[0]
             names = {name: action for action in self._actions for name in action.option_strings}
             word = given.strip("-")

@@ -8,8 +8,7 @@ the slopes of the parameters as across them, with two degrees of freedom.
 from math import sqrt
 
 import numpy as np
-from scipy.special import stdtrit
-from scipy.stats import f as fisher
+from scipy.special import fdtri, stdtrit
 
 LARGEST_MISFIT = 0.2  # of the motion, beyond the noise, with which a model describes a record
 NOT_DESCRIBED = "the model does not describe this record"
@@ -24,7 +23,7 @@ def beyond_noise(chi_squared: float, dof: float, freedom: float = np.inf) -> flo
     """
     if not freedom > 0:
         return chi_squared
-    return max(chi_squared - dof * float(fisher.isf(CHANCE, dof, min(freedom, 1e6))), 0.0)
+    return max(chi_squared - dof * float(fdtri(dof, min(freedom, 1e6), 1 - CHANCE)), 0.0)
 
 
 def systematic(beyond: float) -> float:

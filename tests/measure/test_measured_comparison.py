@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model import ErrorPart, MovingPressure, Statement, Tacton, Trajectory
 from simple_model.quantities import PRESSURE, quantity
 from skinwave.commands import cli
 from skinwave.measure import Measurement, comparison
@@ -146,8 +146,13 @@ def test_the_overlap_of_a_record_that_begins_before_the_tacton():
 
 def test_differences_within_the_numerical_error_are_marked(models):
     rng = np.random.default_rng(2)
-    rough = [replace(run, response=replace(run.response, expected_error=0.5))
-             for run in models[False]]  # fmt: skip
+    errors = Statement(parts=(ErrorPart(name="mesh", source="elements", error=0.5),))
+    rough = [
+        replace(run, response=replace(
+            run.response, effort=replace(run.response.effort, errors=errors)
+        ))
+        for run in models[False]
+    ]  # fmt: skip
     found = compare_measured(Measured(measurement=record(models[True][-1], rng, sigma=2e-5)), rough)
     assert (found.findings(found.main) == comparison.NUMERICAL).any()
 

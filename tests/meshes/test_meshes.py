@@ -161,7 +161,7 @@ def test_elements_of_the_palm_are_good_and_the_same_in_every_run():
 def test_a_relief_that_a_grid_cannot_follow_is_refused():
     relief = Relief(thenar_height=0.022, hypothenar_height=0.022, edge_radius=0.001)
     body = Body(kind="palm", width=0.085, depth=0.022, relief=relief)
-    with pytest.raises(MeshError, match="dihedral angle"):
+    with pytest.raises(MeshError, match="angle between faces"):
         mapped_palm(body.palm, *grid(body.palm, 5e-3))
     with pytest.raises(MeshError, match="reduce thenar_height_mm"):
         body_palm.discretise(body, 5e-3)

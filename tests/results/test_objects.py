@@ -184,7 +184,7 @@ def test_notebook_pages_have_figures_and_warnings_and_escape_text(scene):
     agreement = skinwave.compare(kernel, response, (100.0,))
     row = PlanRow(what="model", value="fem", reason="as <than> said")
     plan = skinwave.Plan(model="fem", body=scene.body, symmetry="x", rows=(row,),
-                         warnings=("less <than> asked",))  # fmt: skip
+                         cautions=("less <than> asked",))  # fmt: skip
     for record in (scene, response, kernel, agreement, plan, wave(quantity="pressure")):
         page = record._repr_html_()
         assert ("data:image/png;base64," in page) == (record is not agreement)

@@ -148,7 +148,7 @@ def test_an_interrupted_report_keeps_finished_runs(folder, capsys, monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("skinwave.studies.album.write_album", lambda *given, **options: [])
+        patch.setattr("skinwave.studies.album.write_album", lambda *given, **options: ([], []))
         patch.setattr("skinwave.studies.report.write_report", interrupted)
         asked = ["report", "none.toml", "--style", "talk", "--quiet", "--out", "a report"]
         assert main(asked) == 1

@@ -138,7 +138,7 @@ def test_maps_of_a_stretching_sheet_leave_out_free_vibration(monkeypatch):
     found = ringing(load, 0.5)
     motion = lambda scene, tolerance: (found.times, found.values, modes)  # noqa: E731
     monkeypatch.setattr(surface, "sheet_motion", motion)
-    monkeypatch.setattr(surface, "beyond_linear", lambda *_: True)
+    monkeypatch.setattr(surface, "stretches", lambda *_: True)
     drawn = body_map(sheet, x, y)
     np.testing.assert_allclose(drawn.rms, 2 * 6e-6 / np.sqrt(2), rtol=0.01)
     # Pulses have no steady vibration: the map is that of the whole motion, and says so.

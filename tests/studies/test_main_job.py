@@ -128,5 +128,5 @@ def test_the_page_has_at_most_four_screens(job, browser):
     tab.click("label:text-is('am140')")
     assert chosen.inner_text().startswith("am140:")
     tab.click("nav >> text=Effort")
-    assert tab.locator("#effort table").is_visible()
+    assert tab.locator("#errors-and-effort table").first.is_visible()
     tab.close()
