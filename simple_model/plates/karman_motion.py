@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg.lapack import dposv
@@ -38,7 +39,7 @@ from simple_model.plates.free_modes import WITHOUT_LOSS, FreeModes, Loss, free_m
 from simple_model.plates.modes import PlateModes, modal_motion, modal_motion_apart
 from simple_model.plates.path_forces import MIDDLE, modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
-from simple_model.typing import Floats, Ints
+from simple_model.typing import Complex, Floats, Ints
 
 HIGHEST_PHASE = 1.2  # rad per half step; faster modes are slowed down to it
 
@@ -68,25 +69,37 @@ def linear_motion(
     are 0 or above; `middle` (2,) in m is that of the plate in the scene. Returns the modes of
     indices `chosen` (r,), by default all. Lines of the load at or above `highest` Hz are left out.
     """
-
-    def modulus(omega: Floats) -> Floats:
-        return np.asarray(material.complex_modulus(omega) / material.shear_modulus)
-
+    x, y = middle
+    f, motion, free, start = _linear_parts(modes, pressure, material, (x, y), highest)
     chosen = np.arange(len(modes.squared)) if chosen is None else chosen
-    f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
-    f, forces = f[f < highest], forces[f < highest]
-    motion = modal_motion(modes, f, forces, modulus)[:, chosen]
-    coupling = motion - modal_motion_apart(modes, f, forces, modulus)[:, chosen]
-    every = free_modes(modes, material)
-    free = FreeModes(poles=every.poles[chosen], residues=every.residues[chosen])
-    start = free.start(f, forces[:, chosen])
-    start -= free.impulse(coupling.real.sum(axis=0), (2j * np.pi * f @ coupling).real)
-    coordinates = synthesise(f, motion, times)
-    for poles, amplitudes in zip(free.poles.T, start.T, strict=True):
+    coordinates = synthesise(f, motion[:, chosen], times)
+    for poles, amplitudes in zip(free.poles[chosen].T, start[chosen].T, strict=True):
         moving = amplitudes != 0
         decay = np.exp(np.multiply.outer(times, poles[moving]))
         coordinates[:, moving] += (decay * amplitudes[moving]).real
     return coordinates
+
+
+@lru_cache(maxsize=4)
+def _linear_parts(
+    modes: PlateModes, pressure: MovingPressure, material: Material, middle: tuple[float, float],
+    highest: float,
+) -> tuple[Floats, Complex, FreeModes, Complex]:  # fmt: skip
+    """Return frequencies (f,) in Hz and steady coordinates (f, m) of the lines below `highest`, the
+    free modes, and the amplitudes (m, j) of their vibration; kept, because several runs need them.
+    """
+
+    def modulus(omega: Floats) -> Floats:
+        return np.asarray(material.complex_modulus(omega) / material.shear_modulus)
+
+    f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
+    f, forces = f[f < highest], forces[f < highest]
+    motion = modal_motion(modes, f, forces, modulus)
+    coupling = motion - modal_motion_apart(modes, f, forces, modulus)
+    free = free_modes(modes, material)
+    start = free.start(f, forces)
+    start -= free.impulse(coupling.real.sum(axis=0), (2j * np.pi * f @ coupling).real)
+    return f, motion, free, start
 
 
 def stretched_motion(

@@ -147,25 +147,23 @@ def note_scenes(options: argparse.Namespace) -> None:
 
     The command itself refuses a file that cannot be read.
     """
+    name = options.command_name
+    has_own_warnings = name in ("plan", "run")
+    samples = (name == "run" and options.samples is not None) or getattr(options, "best", None)
+    has_no_note = samples or name == "plan" or getattr(options, "quiet", False)
+    if has_own_warnings and has_no_note:
+        return
     from skinwave.planning.plan_warnings import implausible
     from skinwave.scene.file import read
 
-    name = options.command_name
-    paths = [getattr(options, "scene", None), *getattr(options, "scenes", [])]
-    for path in paths:
+    for path in [getattr(options, "scene", None), *getattr(options, "scenes", [])]:
         with warnings.catch_warnings(), suppress(ValueError):
             warnings.simplefilter("ignore")
             if not isinstance(path, Path) or not path.is_file():
                 continue
             scene = read(path)
-            if name not in ("plan", "run"):
-                warn(implausible(scene))
-            samples = (name == "run" and options.samples is not None) or getattr(
-                options, "best", None
-            )
-            if scene.spreads and not (
-                samples or name == "plan" or getattr(options, "quiet", False)
-            ):
+            warn(() if has_own_warnings else implausible(scene))
+            if scene.spreads and not has_no_note:
                 keys = ", ".join(key for key, _ in scene.spreads)
                 say(f"skinwave: uses the central values of {keys}; skinwave run --samples N "
                     "samples their distributions", sys.stderr)  # fmt: skip

@@ -167,22 +167,23 @@ def stretching_error(scene: Scene, model: Model, tolerance: float) -> float:
     is_linear = model.needs_body and not model.is_nonlinear
     if not (is_linear and scene.body.of_kind.is_plate):
         return 0.0
-    bound = _stretching_bound(scene)
-    plain = _displacement_scene(scene)
-    if bound > NEGLIGIBLE * tolerance and takes(STRETCHED, plain):
+    plain, negligible = _displacement_scene(scene), NEGLIGIBLE * tolerance
+    bound = _stretching_bound(scene, negligible)
+    if bound > negligible and takes(STRETCHED, plain):
         return _measured_linear_error(plain, len(sample_times(plain)))
     return min(1.0, bound)
 
 
-def _stretching_bound(scene: Scene) -> float:
-    """Return a bound of the relative error of linear bending at small deflection: stretching raises
-    natural frequencies by at most `HARDENING` (w / h)^2, and a resonance multiplies this.
+def _stretching_bound(scene: Scene, negligible: float) -> float:
+    """Return a bound of the relative error of linear bending at small deflection, no sharper than
+    to decide whether it is negligible: stretching raises natural frequencies by at most `HARDENING`
+    (w / h)^2, and a resonance multiplies this.
     """
-    plain = _displacement_scene(scene)
-    squared = linear_deflection(scene) ** 2
-    if not squared or not takes(FROM_REST, plain):
-        return STEEPEST * squared
-    return squared * max(STEEPEST, HARDENING * plate_modes.sensitivity(plain))
+    squared, plain = linear_deflection(scene) ** 2, _displacement_scene(scene)
+    bound = STEEPEST * squared
+    if not squared or bound > negligible or not takes(FROM_REST, plain):
+        return bound
+    return max(bound, HARDENING * plate_modes.sensitivity(plain) * squared)
 
 
 def stretches(scene: Scene, tolerance: float) -> float:
@@ -191,9 +192,9 @@ def stretches(scene: Scene, tolerance: float) -> float:
     """
     if not takes(STRETCHED, scene):
         return 0.0
-    plain, times = _displacement_scene(scene), sample_times(scene)
-    if _stretching_bound(scene) > NEGLIGIBLE * tolerance:
-        error = _measured_linear_error(plain, len(first_part(plain, times)))
+    plain, negligible = _displacement_scene(scene), NEGLIGIBLE * tolerance
+    if _stretching_bound(scene, negligible) > negligible:
+        error = _measured_linear_error(plain, len(first_part(plain, sample_times(plain))))
         if error > tolerance / 2:
             return error
     error = stretching_error(scene, FROM_REST, tolerance)
