@@ -117,14 +117,14 @@ def line_table(
     named = named.with_more(_apart(other_lines or {}, named, same))
     named = named.some(named.frequencies < nyquist)
     fit = _fit(named, response)
-    peaks = _peaks(pressure, response, fit)
+    peaks = _peaks(pressure, response, named, fit)
     steady = [peak.frequency for peak in peaks if peak.kind != FREE]
     if steady:  # lines that are weak in the load may be strong in a response
         weak = line_names(pressure, FAINTEST, most=10**6)
         weak = weak.some(weak.frequencies < nyquist)
         named = _with_weak(named, weak, steady, resolution(response))
         fit = _fit(named, response)
-        peaks = _peaks(pressure, response, fit)
+        peaks = _peaks(pressure, response, named, fit)
     return _table(named, fit, peaks, response)
 
 
@@ -223,8 +223,11 @@ def _fit(named: LineNames, response: Response) -> _Fit:
     return _Fit(resolved=resolved, fitted=fitted, amplitudes=amplitudes, rest=rest)
 
 
-def _peaks(pressure: MovingPressure, response: Response, fit: _Fit) -> list[Unnamed]:
-    """Peaks in the spectrum of the whole response minus the fitted lines."""
+def _peaks(
+    pressure: MovingPressure, response: Response, named: LineNames, fit: _Fit
+) -> list[Unnamed]:
+    """Peaks in the spectrum of the whole response minus the fitted lines, away from these lines."""
+    least, fitted = resolution(response), named.frequencies[fit.fitted]
     dt, begun = step(response.times), round(SETTLE * len(fit.rest))
     amplitude = windowed_amplitude(fit.rest, WINDOW)
     round_off = ROUND_OFF * float(np.abs(response.values).max(initial=0.0))
@@ -243,7 +246,10 @@ def _peaks(pressure: MovingPressure, response: Response, fit: _Fit) -> list[Unna
     for k in chosen[:MOST_PEAKS]:
         bins = k + _offset(amplitude[k - 1 : k + 2, int(np.argmax(level[k]))])
         turns = bins / len(fit.rest)
-        of_load = _near(np.array([turns / dt]), driven, resolution(response))[0]
+        f = np.array([turns / dt])
+        if _near(f, fitted, least)[0]:  # the start of a line
+            continue
+        of_load = _near(f, driven, least)[0]
         free = response.record.of_body and _decays(fit.rest[begun:], turns)
         kind = OF_LOAD if of_load else FREE if free else UNNAMED
         peaks.append(Unnamed(frequency=turns / dt, amplitudes=amplitude[k], kind=kind))

@@ -90,7 +90,7 @@ def _parts(scene: Scene, h: float | None) -> Iterator[ErrorPart]:
     """Yield the parts of the error of a wavenumber integral, compared with finite elements."""
     yield ErrorPart(
         name="integral", source="the wavenumber integral", error=INTEGRAL_ERROR,
-        cure=f"use a tolerance of {100 * INTEGRAL_ERROR:g} % or more",
+        cure=f"use a tolerance of {100 * INTEGRAL_ERROR:g} % or more, the limit of the method",
     )  # fmt: skip
     if scene.body.of_kind.is_plate:
         yield without_shear(scene, INDENTED * _effect_of_shear(scene))

@@ -122,8 +122,8 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
 
 
 def _error_row(statement: Statement) -> PlanRow:
-    """Return the row of the expected error: its parts, and what reduces the largest."""
-    reason = f"to lower the largest part, {statement.cure}" if statement.cure else ""
+    """Return the row of the expected error: its parts, and the cure of the largest."""
+    reason = f"cure of the largest part: {statement.cure}" if statement.cure else ""
     return PlanRow(what="expected error", value=statement.words, reason=reason)
 
 

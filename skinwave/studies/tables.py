@@ -31,7 +31,7 @@ AGREEMENT = (
     "misfit at the best gain and delay", "delay at the probes, ms",
     "phase delay of the strongest component, ms", "spread over the probes at -6 / -20 dB, mm",
 )  # fmt: skip
-ERRORS = "body", "expected error of the waveform at the worst probe", "to lower the largest part"
+ERRORS = "body", "expected error of the waveform at the worst probe", "cure of the largest part"
 ERROR_RULE = "The squares of the parts add, because their causes are independent."
 EFFORT = (
     "body", "degrees of freedom", "reduced to", Column("estimated reduction error", digits=2),
