@@ -504,3 +504,12 @@ def test_lines_of_a_shaken_body_are_those_of_pressure_and_support():
 def with_tones(pressure, am_frequency, duration):
     tacton = replace(pressure.tacton, am_frequency=am_frequency, duration=duration)
     return replace(pressure, tacton=tacton)
+
+
+def test_gravity_alone_has_the_error_of_its_deflection():
+    scene = loads(
+        "[tacton]\nduration_s = 0.02\namplitude_percent = 0\n[body]\nsize_x_mm = 30\n"
+        "size_y_mm = 30\nthickness_mm = 8\nsides = 'clamped'\n[load]\ngravity_m_per_s2 = 9.81"
+    )
+    response = skinwave.simulate(scene, "fem", 0.3, h=6e-3)
+    assert 0 < response.expected_error < 0.2
