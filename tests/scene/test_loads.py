@@ -509,7 +509,8 @@ def with_tones(pressure, am_frequency, duration):
 def test_gravity_alone_has_the_error_of_its_deflection():
     scene = loads(
         "[tacton]\nduration_s = 0.02\namplitude_percent = 0\n[body]\nsize_x_mm = 30\n"
-        "size_y_mm = 30\nthickness_mm = 8\nsides = 'clamped'\n[load]\ngravity_m_per_s2 = 9.81"
+        "size_y_mm = 30\nthickness_mm = 8\nsides = 'clamped'\n[load]\ngravity_m_per_s2 = 9.81\n"
+        "[probes]\npoints_mm = [[0, 0]]"
     )
     response = skinwave.simulate(scene, "fem", 0.3, h=6e-3)
     assert 0 < response.expected_error < 0.2
