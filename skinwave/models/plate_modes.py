@@ -140,8 +140,10 @@ def answer_from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Resp
 
 
 def thin_plate_part(scene: Scene) -> ErrorPart:
-    """Return the part of the error that is due to shear and rotary inertia; what grows in the first
-    part of a record, at most with time, may be negligible for the whole.
+    """Return the part of the error that is due to shear and rotary inertia.
+
+    The effect on the first part of a record grows at most in proportion to time. If it is then
+    negligible, the whole record is not computed.
     """
     times = sample_times(scene)
     first = len(first_part(scene, times))
