@@ -62,8 +62,9 @@ class Model:
         response
     limits : function of a scene with a body that yields each `Limit` that it exceeds; by default
         the model computes only the displacement of the surface under a pressure
-    parts : function of scene and element size in m that yields each `ErrorPart` of the model
-        itself; a plan adds what the model leaves out of the scene. By default nothing is known
+    parts : function of scene and options, with the element size, that yields each `ErrorPart` of
+        the model itself; a plan adds what the model leaves out of the scene. By default nothing is
+        known
     default_size : function of a body that returns its element size in m; None without a mesh
     seconds, memory : predicted cost of a first response, s and bytes, unless a plan measures it
     colour : str, for figures
@@ -83,7 +84,7 @@ class Model:
     words: str
     solve: "Callable[[Scene, Floats, SolveOptions], Response]"
     limits: "Callable[[Scene], Iterable[Limit]] | None" = None
-    parts: "Callable[[Scene, float | None], Iterable[ErrorPart]] | None" = None
+    parts: "Callable[[Scene, SolveOptions], Iterable[ErrorPart]] | None" = None
     default_size: "Callable[[Body], float] | None" = None
     seconds: float = 0.1
     memory: float = 1e8

@@ -86,7 +86,7 @@ def field_read(scene: Scene, depth: float) -> Field:
     return surface_field(scene.reading.record, compliance(scene.body))
 
 
-def _parts(scene: Scene, h: float | None) -> Iterator[ErrorPart]:
+def _parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
     """Yield the parts of the error of a wavenumber integral, compared with finite elements."""
     yield ErrorPart(
         name="integral", source="the wavenumber integral", error=INTEGRAL_ERROR,

@@ -290,7 +290,7 @@ MODES = register(
         words="the steady state of a thin plate, in its modes by Ritz's method",
         solve=steady_answer,
         limits=limits,
-        parts=lambda scene, h: [ERROR, thin_plate_part(scene)],
+        parts=lambda scene, options: [ERROR, thin_plate_part(scene)],
         seconds=0.5,
         memory=2e8,
         colour="#F0E442",
@@ -429,12 +429,25 @@ def _resolve(
         if error <= 2 * allowed:
             break
     shorter = f"{sample / parts / 2:.7f}".rstrip("0")
-    part = ErrorPart(
-        name="steps and modes", error=error,
-        source=f"{count} modes that stretch, in steps of {1e3 * sample / parts:.3g} ms",
-        cure=f"use a lower pressure, a material with more loss, or skinwave run --dt {shorter}",
+    part = steps_part(
+        f"{count} modes that stretch, in steps of {1e3 * sample / parts:.3g} ms", error,
+        f", or skinwave run --dt {shorter}",
     )  # fmt: skip
     return Stretching(values=values, count=count, parts=parts, error=part)
+
+
+def steps_part(source: str, error: float, more: str = "") -> ErrorPart:
+    """Return the part of the error of the steps and the modes of a sheet that stretches."""
+    cure = f"use a lower pressure or a material with more loss{more}"
+    return ErrorPart(name="steps and modes", source=source, error=error, cure=cure)
+
+
+def _planned_parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
+    """Yield the parts of a sheet that stretches, with the error at which steps and modes suffice,
+    which the response replaces by its own.
+    """
+    yield from (ERROR, thin_plate_part(scene))
+    yield steps_part("modes that stretch, in time steps", SHARE * options.tolerance)
 
 
 def _stretching(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int) -> Floats:
@@ -471,6 +484,7 @@ STRETCHED = register(
         method="large deflection of a thin plate in its modes, from rest",
         words="a thin plate in bending and stretching, from rest, with modes by Ritz's method",
         solve=stretched_answer,
+        parts=_planned_parts,
         seconds=5.0,
         memory=4e8,
         colour="#4D4D9F",

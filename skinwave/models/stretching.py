@@ -301,6 +301,11 @@ def _limits(
         yield limits.load_limit(scene)
 
 
+def _parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
+    h = options.h or 0.0
+    yield mesh_part(h, expected_error(scene.body, h))
+
+
 REDUCED_SIZE, FULL_SIZE = (partial(stretching_size, reduced=reduced) for reduced in (True, False))
 REDUCED = register(
     Model(
@@ -309,7 +314,7 @@ REDUCED = register(
         words="a sheet that stretches as it bends, in its modes, from rest",
         solve=reduced_answer,
         limits=partial(_limits, limits.frame_air_limits, REDUCED_SIZE),
-        parts=lambda scene, h: [mesh_part(h or 0.0, expected_error(scene.body, h or 0.0))],
+        parts=_parts,
         default_size=REDUCED_SIZE,
         sources=(NEWMARK, NEWTON),
         is_nonlinear=True,

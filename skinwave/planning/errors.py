@@ -11,6 +11,7 @@ from simple_model import ErrorPart
 from skinwave.models import Model
 from skinwave.models.laws import own_laws, series_tolerance
 from skinwave.models.limits import takes
+from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.plate_modes import STRETCHED
 from skinwave.models.reduced import BAND, ReducedBody
 from skinwave.planning.estimates import spot_scale
@@ -20,12 +21,10 @@ from skinwave.planning.refinement import enough
 from skinwave.scene.scene import Scene
 
 
-def own_parts(model: Model, scene: Scene, h: float | None) -> tuple[ErrorPart, ...]:
-    """Return the parts of a model itself with elements of h in m; one of unknown size if it does
-    not estimate its error.
-    """
+def own_parts(model: Model, scene: Scene, options: SolveOptions = DEFAULT) -> tuple[ErrorPart, ...]:
+    """Return the parts of a model itself; one of unknown size if it does not estimate its error."""
     if model.parts:
-        return tuple(model.parts(scene, h))
+        return tuple(model.parts(scene, options))
     source = f"{model.name}, which does not estimate its error"
     cure = "compare its response with that of another model"
     return (ErrorPart(name="model", source=source, error=inf, cure=cure),)

@@ -225,7 +225,7 @@ def why_modes(scene: Scene, tolerance: float) -> str:
 
 def _suffices(model: Model, scene: Scene, tolerance: float) -> bool:
     """Whether the own error of a model is within the tolerance, or elements cannot replace it."""
-    own = Statement(parts=errors.own_parts(model, scene, None))
+    own = Statement(parts=errors.own_parts(model, scene))
     return own.error <= tolerance or not takes(FEM, scene)
 
 
@@ -288,7 +288,8 @@ def _plan_without_mesh(request: _Request) -> tuple[Plan, list[ErrorPart]]:
             *rows,
             *(row for row in neglected if not (model.is_nonlinear and "stretching" in row.what)),
         ]
-    parts = [*errors.own_parts(model, scene, size), *errors.start_parts(model, start)]
+    own = errors.own_parts(model, scene, replace(options, h=size))
+    parts = [*own, *errors.start_parts(model, start)]
     parts += _parts_of_infinite_body(request) if model.is_infinite else []
     planned = Plan(
         model=model.name, body=scene.body, h=size, highest=highest, rows=tuple(rows),

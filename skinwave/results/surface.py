@@ -206,7 +206,7 @@ def quantity_map(
 
         return _field(scene, x, y, lines_of, "wavenumber integral of the laterally infinite body")
     if options.h is None and scene.reading.is_plain and takes(FROM_REST, scene):
-        error = Statement(parts=own_parts(FROM_REST, scene, None)).error
+        error = Statement(parts=own_parts(FROM_REST, scene)).error
         return replace(_plate_map(scene, x, y), error=error)
     if scene.load.support_motion or (scene.load.gravity and scene.reading.record.invariant):
         raise ValueError(
