@@ -89,7 +89,7 @@ class Data:
     whitening: Floats | None = None
     lines: tuple[str, ...] = ()  # fitted lines
     left_out: tuple[LeftOutLine, ...] = ()  # lines of the load that are not fitted
-    freedom: float = np.inf  # degrees of freedom of the errors; 0 if noise and misfit are not told
+    freedom: float = np.inf  # degrees of freedom of the errors; 0 if noise and misfit are one
     # apart
     rough: "Data | None" = None  # cheaper data of the same record, for the search
 

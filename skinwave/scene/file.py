@@ -81,10 +81,9 @@ def loads(text: str) -> Scene:
 
 def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
     """Return the table of a TOML text; numbers replace the modulus files in a folder."""
+    # The time of the parser is quadratic in the parts of a key.
     if max(map(_parts, re.split(r"[\n#={,]", text))) > DEEPEST:
-        raise ValueError(
-            TOO_DEEP
-        )  # the parser takes a time that is quadratic in the parts of a key
+        raise ValueError(TOO_DEEP)
     try:
         table = tomllib.loads(text)
     except ValueError as error:

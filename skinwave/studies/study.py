@@ -106,11 +106,8 @@ def run_study(
     fail.
     """
     models = _models(scenes, options)
-    started, planned, progress = (
-        time.perf_counter(),
-        sum(map(len, scenes.values())),
-        options.progress,
-    )
+    started, planned = time.perf_counter(), sum(map(len, scenes.values()))
+    progress = options.progress
     groups: dict[str, list[Run]] = {}
     failed, interrupted = dict(failures or {}), True
     prepared: dict[str, ReducedBody] = {}
