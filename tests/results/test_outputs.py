@@ -175,10 +175,10 @@ def test_a_full_disk_is_reported_in_one_sentence(folder, refused, monkeypatch):
     def full(path, *given, **options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
-    monkeypatch.setattr("pathlib.Path.write_text", full)
-    refused(*RUN, "--out", "out")
-    monkeypatch.undo()
-    refused(*RUN, "--out", "n" * 300)
+    with monkeypatch.context() as patched:  # `undo` would leave the folder of this test, too
+        patched.setattr("pathlib.Path.write_text", full)
+        assert "space" in refused(*RUN, "--out", "out")
+    assert "nnn" in refused(*RUN, "--out", "n" * 300)
 
 
 def test_a_file_is_written_completely_or_not_at_all(folder):
