@@ -13,7 +13,7 @@ A thin plate has no shear and no rotary inertia. Their effect on the motion of e
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from functools import lru_cache, partial
 from itertools import pairwise
 from math import ceil
 from typing import Any
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.reduced import exponential_sum
-from simple_model import Effort, ErrorPart, Response, Statement
+from simple_model import Effort, ErrorPart, MovingPressure, Response, Statement
 from simple_model.layers.compliance import AIR_DENSITY, thick_plate
 from simple_model.load.sampling import below_half_the_rate, highest_driving, step
 from simple_model.load.spectrum import lines_from_rest, synthesise
@@ -341,10 +341,11 @@ def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
     """Return the largest relative error of a linear response (t, p) from rest."""
     modes: PlateModes = modes_of(plate_of(scene.body))
     parts = ceil(step(times) / LONGEST - 1e-9)
-    stretching = _stretching(scene, times, modes, min(COUNTS[0], len(modes.squared)), parts)
+    stretching = _stretching(scene, times, min(COUNTS[0], len(modes.squared)), parts)
     return float(relative_changes(stretching, linear + stretching).max())
 
 
+@lru_cache(maxsize=1)
 def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
     """Return the motion of a whole sheet from rest: times (t,) in s, coordinates (t, m) in kg^1/2 m
     of all modes, and the modes.
@@ -352,12 +353,12 @@ def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateM
     times = sample_times(scene)
     options = SolveOptions(tolerance=tolerance)
     modes: PlateModes = modes_of(plate_of(scene.body))
-    linear = FROM_REST.solve(scene, times, options).values
-    start = first_part(scene, times)
-    found = _resolve(scene, start, options, modes, linear[: len(start)])
+    found = _stretch(scene, times, options, modes, FROM_REST.solve(scene, times, options).values)
     middle = scene.body.placement.offset
     z = linear_motion(modes, scene.pressure, scene.body.solid, times, middle=middle)
-    plate, stretching = _stretching_coordinates(scene, times, modes, found.count, found.parts)
+    plate, stretching = _coordinates(
+        scene.pressure, scene.body, len(times), step(times), found.count, found.parts
+    )
     z[:, plate.chosen] += stretching[:: found.parts]
     return times, z, modes
 
@@ -401,13 +402,13 @@ def _resolve(
     # A record of few samples cannot have longer steps.
     parts = max(least[1], 1 + (len(times) <= 4 * DEGREE))
     parts = max(parts, ceil(sample / (options.dt or LONGEST) - 1e-9))
-    solved = cache(lambda count, parts: _stretching(scene, times, modes, count, parts))
+    solved = partial(_stretching, scene, times)
 
     def with_longer_steps(count: int) -> tuple[Floats, int, float]:
         """Return the values with longer steps, their stride, and the ratio of the steps."""
         if parts > 1:
             return solved(count, parts // 2), 1, parts / (parts // 2)
-        return _stretching(scene, times[::2], modes, count, 1), 2, 2.0
+        return _stretching(scene, times[::2], count, 1), 2, 2.0
 
     def change(other: Floats, stride: int = 1) -> float:
         whole = (linear + values)[::stride]
@@ -453,9 +454,11 @@ def _planned_parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
     yield steps_part("modes that stretch, in time steps", allowed)
 
 
-def _stretching(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int) -> Floats:
+def _stretching(scene: Scene, times: Floats, count: int, parts: int) -> Floats:
     """Return what stretching adds to the quantity (t, p), with `parts` steps per sample."""
-    plate, coordinates = _stretching_coordinates(scene, times, modes, count, parts)
+    plate, coordinates = _coordinates(
+        scene.pressure, scene.body, len(times), step(times), count, parts
+    )
     values = coordinates @ plate.shapes(scene.probe_points - scene.body.placement.offset).T
     if rate := scene.reading.record.rate:
         from scipy.interpolate import make_interp_spline  # slow to import
@@ -465,17 +468,20 @@ def _stretching(scene: Scene, times: Floats, modes: PlateModes, count: int, part
     return np.asarray(values[::parts])
 
 
-def _stretching_coordinates(
-    scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int
+@lru_cache(maxsize=12)  # the response, the map and the picture of a sheet need the same ones
+def _coordinates(
+    pressure: MovingPressure, body: Body, samples: int, sample: float, count: int, parts: int
 ) -> tuple[KarmanPlate, Floats]:
-    """Return the plate, and the coordinates (n, r) in kg^1/2 m that stretching adds at each step"""
-    body, dt = scene.body, step(times) / parts
+    """Return the plate, and the coordinates (n, r) in kg^1/2 m that stretching adds at each of
+    `parts` steps of every `sample` in s.
+    """
+    modes, dt = modes_of(plate_of(body)), sample / parts
     plate = _karman(modes, body.depth, count)
-    steps = np.asarray(dt * np.arange(parts * (len(times) - 1) + 1), np.float64)
+    steps = np.asarray(dt * np.arange(parts * (samples - 1) + 1), np.float64)
     # Faster lines hardly deflect the sheet, and do not stretch it.
     linear = linear_motion(
-        modes, scene.pressure, body.solid, steps, middle=body.placement.offset,
-        chosen=plate.chosen, highest=0.5 / dt,
+        modes, pressure, body.solid, steps, middle=body.placement.offset, chosen=plate.chosen,
+        highest=0.5 / dt,
     )  # fmt: skip
     return plate, stretched_motion(plate, linear, dt, body.solid).coordinates - linear
 

@@ -79,12 +79,12 @@ def surfaces_figure(
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
         extent = tuple(1e3 * np.array([*surface.x[[0, -1]], *surface.y[[0, -1]]]))
         image = ax.imshow(surface.unit_rms, cmap=SEQUENTIAL, vmin=0, origin="lower", extent=extent)
-        borders = [(surface.rms, NEAR, "white", "solid", f"{NEAR:g} dB")]
+        borders = [(surface, NEAR, "white", "solid", f"{NEAR:g} dB")]
         if kernel is not None:
-            borders.insert(0, (kernel.rms, OUTSIDE, KERNEL, "dashed", f"kernel's {OUTSIDE:g} dB"))
+            borders.insert(0, (kernel, OUTSIDE, KERNEL, "dashed", f"kernel's {OUTSIDE:g} dB"))
         for field, drop, colour, dashes, name in borders:
-            level = np.nanmax(field) * 10 ** (drop / 20)
-            if _draw_border(ax, surface, field, level, colour, dashes):
+            level = np.nanmax(field.rms) * 10 ** (drop / 20)
+            if _draw_border(ax, field, field.rms, level, colour, dashes):
                 entries[name] = {"color": colour.replace("white", "0.6"), "ls": dashes}
         level_map = surface.level
         if level_map is not None and _draw_border(ax, surface, level_map, 0.0, THRESHOLD, "solid"):

@@ -5,7 +5,7 @@ from the whole tensor including its mean, as at probes. For an unconstrained bod
 out, because it grows without bound.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,7 +16,7 @@ import fem
 from fem.krylov import load_subspace
 from fem.stress import SolidPart, nodal_strain, solid_parts
 from meshes import TetMesh, part
-from simple_model import Effort, Material, Response
+from simple_model import Effort, Material, Response, Trajectory
 from simple_model.layers.tensors import hooke
 from simple_model.load.path_cells import path_samples
 from simple_model.load.spectrum import synthesise
@@ -126,30 +126,51 @@ def whole_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
 
 def reduced_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
     """Mesh a body, reduce it to the subspace of the load along its path, and compute its lines."""
-    clock, report, tolerance = Clock(), options.progress, options.tolerance
-    body = relaxing(scene.body, series_tolerance(tolerance))
+    return next(reduced_motions([scene], options))[1]
+
+
+def reduced_motions(
+    scenes: Sequence[Scene], options: SolveOptions
+) -> Iterator[tuple[Scene, BodyMotion]]:
+    """Yield scenes that differ in their pressure only, path by path, each with its motion.
+
+    The body is meshed once, and reduced once for each path: a subspace for all paths would be as
+    large as the sum of theirs, and its cost grows with the square of its size.
+    """
+    clock, report, tolerance, first = Clock(), options.progress, options.tolerance, scenes[0]
+    body = relaxing(first.body, series_tolerance(tolerance))
     build = mesh_body(body, options.h, clock, report)
     operators = assemble(build, clock, report)
-    P, points = surface_load(build, scene.load)
-    with clock("factorise and reduce"):
-        report("factorise", 0.0)
-        spots = scene.pressure.spot(points, path_samples(scene.loads[0]))
-        subspace = sparse.csr_array(load_subspace(spread(P, spots.T), tolerance / 10).T)
-        reduced, model = reduce_body(
-            body, build, operators, subspace, tolerance, surface=(P, points),
-            solver=options.solver, report=report,
-        )  # fmt: skip
-    with clock("lines"):
-        motion = in_pulses = respond(reduced, *scene.loads)
-        if (steady := scene.during_pulses) is not scene:
-            in_pulses = respond(reduced, *steady.loads)
-    offline = with_cost(reduced.effort, clock, build, options.h or default_size(scene.body))
-    effort = replace(
-        offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
-        radiated=motion.radiated,
-    )  # fmt: skip
-    basis = np.ascontiguousarray(model.basis)  # its rows are read a few at a time
-    return BodyMotion(build=build, basis=basis, motion=motion, in_pulses=in_pulses, effort=effort)
+    P, points = surface_load(build, first.load)
+    groups: dict[Trajectory, list[Scene]] = {}
+    for each in scenes:
+        groups.setdefault(each.tacton.trajectory, []).append(each)
+    for group in groups.values():
+        with clock("factorise and reduce"):
+            report("factorise", 0.0)
+            spots = group[0].pressure.spot(points, path_samples(group[0].loads[0]))
+            subspace = sparse.csr_array(load_subspace(spread(P, spots.T), tolerance / 10).T)
+            reduced, model = reduce_body(
+                body, build, operators, subspace, tolerance, surface=(P, points),
+                solver=options.solver, report=report,
+            )  # fmt: skip
+        basis = np.ascontiguousarray(model.basis)  # its rows are read a few at a time
+        for scene in group:
+            with clock("lines"):
+                motion = in_pulses = respond(reduced, *scene.loads)
+                if (steady := scene.during_pulses) is not scene:
+                    in_pulses = respond(reduced, *steady.loads)
+            offline = with_cost(reduced.effort, clock, build, options.h or default_size(first.body))
+            effort = replace(
+                offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
+                radiated=motion.radiated,
+            )  # fmt: skip
+            yield (
+                scene,
+                BodyMotion(
+                    build=build, basis=basis, motion=motion, in_pulses=in_pulses, effort=effort
+                ),
+            )
 
 
 def probe_lines(scene: Scene, moved: BodyMotion) -> ReducedResponse:

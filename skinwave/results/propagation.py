@@ -2,12 +2,14 @@
 
 - Share outside: integral of squared RMS motion where the kernel's RMS is 20 dB below its largest,
   over the integral everywhere, both within 44 mm of the origin along x and y.
+- Half: distance from the path within which that integral has half its value.
 - Spread: largest distance from the path at which the RMS is within 6 dB of the largest.
 - Level: largest over components of amplitude over detection threshold, while a pulse is on.
 - Reach: largest distance from the path at which a component is above its threshold, likewise.
 - Phase delay: phase difference of motion and kernel pressure at one probe, over 2 pi f.
 
-All are of the steady vibration about its mean, without free vibration after the start.
+All are of the steady vibration about its mean, without free vibration after the start. On a curved
+surface areas and distances are those along the surface, seen from above.
 """
 
 from dataclasses import dataclass, replace
@@ -26,6 +28,7 @@ from skinwave.typing import Floats
 
 OUTSIDE, NEAR = -20.0, -6.0  # dB re the largest RMS: the kernel's region, and the spread
 PRESENT, ABSENT = -40.0, -100.0  # dB re the strongest component of the same response
+SECTION = 24  # points of a line along a curved surface
 FACTOR_OF_TWO = 20 * np.log10(2.0)  # dB: the uncertainty of a device's pressure
 
 
@@ -60,9 +63,9 @@ class Propagation:
     column : str, the body, as `Run.column`
     strongest, kernel_strongest : components of largest amplitude
     highest_sensation : component of highest sensation level, None unless the body is skin
-    delay : float, s, of the strongest component relative to the kernel, at the probe closest to the
-        path at which both move, or None
-    share, spread, kernel_spread : from the maps, or None without maps
+    delay : float, s, of the kernel's strongest component in the body relative to the kernel, at the
+        probe closest to the path at which both move, or None
+    share, half, kernel_half, spread, kernel_spread : from the maps, or None without maps
     above_threshold : reach with half, once and twice the pressure, each None if nothing exceeds the
         threshold; empty unless the body is skin and has a map
     """
@@ -73,6 +76,8 @@ class Propagation:
     highest_sensation: Component | None
     delay: float | None
     share: float | None = None
+    half: float | None = None
+    kernel_half: float | None = None
     spread: Reach | None = None
     kernel_spread: Reach | None = None
     above_threshold: tuple[Reach | None, ...] = ()
@@ -91,32 +96,68 @@ def propagation(
         raise ValueError(
             f"{run.column} and {kernel.column} have different loads. Compare responses to one load"
         )
-    strongest = strongest_component(run)
+    strongest, of_kernel = strongest_component(run), strongest_component(kernel)
     effect = Propagation(
         column=run.column,
         strongest=strongest,
-        kernel_strongest=strongest_component(kernel),
+        kernel_strongest=of_kernel,
         highest_sensation=strongest_component(run, by_sensation=True) if run.is_skin else None,
-        delay=None if strongest is None else _delay(run, kernel, strongest.frequency),
+        delay=_delay(run, kernel, of_kernel.frequency) if strongest and of_kernel else None,
     )
     if surface is None or kernel_surface is None or not surface.rms.any():
         return effect
-    distance = distance_from_path(run.scene, surface.places)
+    distance, area = distance_along(run.scene, surface), area_of(surface)
     rms, kernel_rms = surface.rms, kernel_surface.rms
     return replace(
-        effect, share=share_outside(kernel_rms, rms),
+        effect, share=share_outside(kernel_rms, rms, area), half=half_within(rms, area, distance),
+        kernel_half=half_within(kernel_rms, area, distance),
         spread=reach_of(rms >= _level(rms, NEAR), distance),
         kernel_spread=reach_of(kernel_rms >= _level(kernel_rms, NEAR), distance),
         above_threshold=_above_threshold(surface, distance) if run.scene.body.is_skin else (),
     )  # fmt: skip
 
 
-def share_outside(kernel: Floats, rms: Floats) -> float:
+def share_outside(kernel: Floats, rms: Floats, area: Floats | float = 1.0) -> float:
     """Return the share (0 to 1) of squared motion (ny, nx) where the kernel (ny, nx) is 20 dB below
-    its largest value. Places off the body are nan.
+    its largest value. Places off the body are nan; `area` (ny, nx) is that of each place.
     """
-    outside = kernel < _level(kernel, OUTSIDE)
-    return float(np.nansum(rms[outside] ** 2) / np.nansum(rms**2))
+    outside, power = kernel < _level(kernel, OUTSIDE), area * rms**2
+    return float(np.nansum(power[outside]) / np.nansum(power))
+
+
+def half_within(rms: Floats, area: Floats, distance: Floats) -> float:
+    """Return the distance in m within which squared motion (ny, nx) has half of its integral, from
+    the area and the `distance` in m of each place.
+    """
+    order = np.argsort(distance, axis=None)
+    power = np.cumsum(np.nan_to_num(area * rms**2).ravel()[order])
+    return float(np.interp(power[-1] / 2, power, distance.ravel()[order]))
+
+
+def area_of(surface: SurfaceField) -> Floats:
+    """Return the area (ny, nx) of the surface at each place, relative to that seen from above."""
+    if surface.height is None or min(surface.height.shape) < 2:
+        return np.ones(surface.rms.shape)
+    slopes = np.gradient(surface.height, surface.y, surface.x)
+    # Beside the rim the slope is unknown.
+    return np.asarray(np.sqrt(1 + sum(np.nan_to_num(slope) ** 2 for slope in slopes)))
+
+
+def distance_along(scene: Scene, surface: SurfaceField) -> Floats:
+    """Return the distance (ny, nx) in m of the places of a map from the path of the focus, along
+    the surface above the straight line to the nearest place of the path.
+    """
+    flat, nearest = _nearest(scene, surface.places)
+    if surface.height is None:
+        return flat
+    from scipy.interpolate import RegularGridInterpolator  # slow to import
+
+    height = RegularGridInterpolator(
+        (surface.x, surface.y), np.nan_to_num(surface.height.T), bounds_error=False, fill_value=None
+    )
+    shares = np.linspace(0, 1, SECTION)[:, None, None, None]
+    levels = height(surface.places + shares * (nearest - surface.places))
+    return np.asarray(np.hypot(flat / (SECTION - 1), np.diff(levels, axis=0)).sum(axis=0))
 
 
 def reach_of(inside: np.ndarray, distance: Floats) -> Reach:
@@ -128,7 +169,14 @@ def reach_of(inside: np.ndarray, distance: Floats) -> Reach:
 
 def distance_from_path(scene: Scene, places: Floats) -> Floats:
     """Return the distance (...) in m of places (..., 2) from the path of the focus."""
-    return np.asarray(cKDTree(path_points(scene, 1441)).query(places)[0])
+    return _nearest(scene, places)[0]
+
+
+def _nearest(scene: Scene, places: Floats) -> tuple[Floats, Floats]:
+    """Return the distances (...) in m of places (..., 2) from the path, and its nearest places."""
+    path = path_points(scene, 1441)
+    distance, index = cKDTree(path).query(places)
+    return np.asarray(distance), path[index]
 
 
 def mach_angle(wave_speed: float, speed: float) -> float | None:

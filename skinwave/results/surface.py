@@ -4,7 +4,7 @@ A body's map is computed by its wavenumber integral, by the modes of a thin plat
 reduced-order finite-element model.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -32,7 +32,12 @@ from skinwave.models.reduced import read_at
 from skinwave.planning.errors import own_parts
 from skinwave.planning.left_out import stretches
 from skinwave.results.comparison import steady_lines as fitted_lines
-from skinwave.results.motion import REDUCTION_TOLERANCE, BodyMotion, reduced_motion
+from skinwave.results.motion import (
+    REDUCTION_TOLERANCE,
+    BodyMotion,
+    reduced_motion,
+    reduced_motions,
+)
 from skinwave.scene.scene import Reading, Scene
 from skinwave.typing import Floats
 
@@ -53,6 +58,8 @@ MANY_TIMES, TIME_STEP = 1024, 0.01 * (1 + 5**0.5) / 2
 LOWEST_FREQUENCY = 1e-9  # Hz: a line below it is the mean
 MOST_AT_ONCE = 2_000_000  # values in time that are held in memory
 MOST_PLACES = 40_000
+FLATNESS = 1e-6  # m: a surface whose heights differ by less is flat
+OPTIONAL = ("level", "height")  # arrays that some maps have
 
 Lines = tuple[Floats, fem.Complex]  # frequencies (f,) in Hz, complex amplitudes (f, p)
 LinesAt = Callable[[Floats], Lines]  # places (p, 2) in m -> their lines
@@ -72,6 +79,8 @@ class SurfaceField:
     depth : float, m, below the surface
     note : str, method of computation
     error : float, expected error relative to the largest RMS, or nan
+    height : (ny, nx) float, m, of the surface above the plane of the focus, nan off the body; None
+        if it is flat
     """
 
     x: Floats
@@ -82,6 +91,7 @@ class SurfaceField:
     depth: float = 0.0
     note: str = ""
     error: float = np.nan
+    height: Floats | None = None
 
     @property
     def places(self) -> Floats:
@@ -133,25 +143,36 @@ def body_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions = DEFAULT
     cannot be meshed.
     """
     if options.h is None and takes(FROM_REST, scene):
-        return _plate_map(scene, x, y, options.model)
+        return _plate_map(scene, x, y, options)
     if has_wavenumber_integral(scene):
 
         def lines_of(scene: Scene) -> Lines:
             return _interpolate(scene.pressure, surface_lines(scene), x, y)
 
         return _field(scene, x, y, lines_of, "laterally infinite layer")
-    size = max(options.h or 0.0, COARSER[scene.body.of_kind.is_plate] * default_size(scene.body))
-    moved = reduced_motion(scene, replace(options, tolerance=MAP_TOLERANCE, h=size))
-    return replace(element_map(scene, moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
+    motion = next(map_motions([scene], options))[1]
+    return element_map(scene, motion, x, y)
 
 
-def _plate_map(scene: Scene, x: Floats, y: Floats, model: str = "auto") -> SurfaceField:
+def map_motions(
+    scenes: Sequence[Scene], options: SolveOptions
+) -> Iterator[tuple[Scene, BodyMotion]]:
+    """Yield scenes that differ in their pressure only, each with the motion of its body for a map.
+
+    Elements are larger than those of `simulate`, or have the size in the options if that is larger.
+    """
+    body = scenes[0].body
+    size = max(options.h or 0.0, COARSER[body.of_kind.is_plate] * default_size(body))
+    return reduced_motions(scenes, replace(options, tolerance=MAP_TOLERANCE, h=size))
+
+
+def _plate_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions) -> SurfaceField:
     """Return the map of a thin plate from its modes, linear if the model is or if that suffices."""
-    places = _places(x, y)
+    places, model = _places(x, y), options.model
     is_linear = model != "auto" and not named(model).is_nonlinear
     if is_linear or not stretches(scene, MAP_TOLERANCE):
         return _field(scene, x, y, partial(plate_lines, places=places), "thin plate")
-    lines, note = stretching_lines(scene, MAP_TOLERANCE)
+    lines, note = stretching_lines(scene, options.tolerance)
     return _field(scene, x, y, lambda _: lines(places), note)
 
 
@@ -207,7 +228,7 @@ def quantity_map(
         return _field(scene, x, y, lines_of, "wavenumber integral of the laterally infinite body")
     if options.h is None and scene.reading.is_plain and takes(FROM_REST, scene):
         error = Statement(parts=own_parts(FROM_REST, scene)).error
-        return replace(_plate_map(scene, x, y), error=error)
+        return replace(_plate_map(scene, x, y, options), error=error)
     if scene.load.support_motion or (scene.load.gravity and scene.reading.record.invariant):
         raise ValueError(
             "a map shows motion about the rest without gravity, on a support at rest. Remove "
@@ -228,10 +249,11 @@ def element_map(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> Surfac
     """Return the map of the probes' quantity from the motion of a meshed body."""
     quantity, depth, mesh = scene.reading.record, scene.depths[0], moved.build.mesh
     places = _places(x, y)
-    on_body = on_surface(mesh, places)
+    on_body, height = on_surface(mesh, places), np.full(len(places), np.nan)
+    patch = scene.body.of_kind.normal_patch
+    points, normals = surface_frame(mesh, places[on_body], patch=patch)
+    height[on_body] = points[:, 2]
     if depth:  # only where the body is that deep along its normal
-        patch = scene.body.of_kind.normal_patch
-        points, normals = surface_frame(mesh, places[on_body], patch=patch)
         on_body[on_body] = fem.is_inside(mesh, points - depth * normals)
     there = Reading(quantity=quantity.name, depths=(depth,) * int(on_body.sum()) if depth else ())
     rows, solids = probe_rows(scene.body, moved.build, places[on_body], there)
@@ -242,15 +264,17 @@ def element_map(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> Surfac
         factor = line_factor(quantity, 2j * np.pi * motion.frequencies, solids, rows.shape[0])
         return motion.frequencies, motion.lines * factor
 
-    return _field(scene, x, y, lines_of, "finite elements", on_body)
+    note = f"elements of {1e3 * moved.effort.h:.2g} mm"
+    field = _field(scene, x, y, lines_of, note, on_body)
+    is_flat = not len(points) or np.ptp(points[:, 2]) <= FLATNESS
+    return field if is_flat else replace(field, height=height.reshape(field.rms.shape))
 
 
 def save(path: Path, field: SurfaceField) -> None:
     """Write a map to an npz file."""
     arrays = {"x": field.x, "y": field.y, "rms": field.rms, "depth": np.array(field.depth),
               "note": np.array(field.note)}  # fmt: skip
-    if field.level is not None:
-        arrays["level"] = field.level
+    arrays |= {name: own for name in OPTIONAL if (own := getattr(field, name)) is not None}
     np.savez(path, **arrays)  # type: ignore[arg-type]
 
 
@@ -264,10 +288,10 @@ def load(path: Path, scene: Scene) -> SurfaceField:
     """
     try:
         arrays = reading.load_arrays(path)
-        names = [name for name in ("x", "y", "rms", "level") if name in arrays]
+        names = [name for name in ("x", "y", "rms", *OPTIONAL) if name in arrays]
         values: dict[str, Any] = {n: np.asarray(arrays[n], np.float64) for n in names}
         x, y, rms = (values[name] for name in ("x", "y", "rms"))
-        shapes = {values.get("level", rms).shape, rms.shape}
+        shapes = {values.get(name, rms).shape for name in ("rms", *OPTIONAL)}
         if x.ndim != 1 or shapes != {(*y.shape, *x.shape)} or not np.isfinite(rms).any():
             raise ValueError(f"'rms' has shape {rms.shape} or no finite value")
         depth, note = float(arrays["depth"]), str(arrays["note"])

@@ -7,7 +7,7 @@ from simple_model import MovingPressure, Tacton, Trajectory, published_load
 from skinwave.scene.scene import BODIES, Body, Scene, with_body
 
 AM_FREQUENCIES = (0.0, 80.0, 140.0, 210.0)  # Hz
-MEASURED_ON = ("paper-sheet", "skin-slab")  # the sheet that they measured, and skin
+MEASURED_ON = ("paper-sheet", "palm")  # the sheet that they measured, and skin
 PATHS = ((0.0, 0.0), (0.010, 6.0), (0.020, 12.0), (0.030, 18.0))  # circle diameter m, speed m/s
 
 

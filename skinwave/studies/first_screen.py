@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from skinwave.models.limits import takes
-from skinwave.models.options import DEFAULT, SolveOptions
+from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.planning.budget import ErrorBudget, error_budget
@@ -21,6 +21,7 @@ from skinwave.results.surface import (
     has_wavenumber_integral,
     kernel_map,
 )
+from skinwave.results.views import View
 from skinwave.scene import paper15
 from skinwave.scene.keys import SCALES
 from skinwave.scene.scene import Scene
@@ -37,16 +38,18 @@ Maps = tuple[SurfaceField, SurfaceField] | tuple[()]  # of a body and of the ker
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FirstScreen:
-    """Results of one Tacton on the first screen of a page: runs of the kernel under the same load
-    and as published, and of bodies; effects and maps by column. If known: smallest and largest
-    share outside over the range of materials, error budget of `body`, and measured places.
+    """Results on the first screen of a page: of one Tacton the runs of the kernel under the same
+    load and as published, and of bodies, and maps and views by column; effects of propagation by
+    Tacton and column. If known: smallest and largest share outside over the range of materials,
+    error budget of `body`, and measured places.
     """
 
     kernel: Run
     published: Run
     bodies: Sequence[Run]
-    effects: Mapping[str, Propagation]
+    effects: Mapping[str, Mapping[str, Propagation]]
     maps: Mapping[str, SurfaceField] = field(default_factory=dict)
+    views: Sequence[View] = ()
     shares: tuple[float, float] | None = None
     budget: ErrorBudget | None = None
     measured: "MeasuredPlaces | None" = None
@@ -57,20 +60,27 @@ class FirstScreen:
         skin = [run for run in self.bodies if run.scene.body.is_skin]
         return (skin or list(self.bodies))[-1]
 
+    @property
+    def own(self) -> Mapping[str, Propagation]:
+        """Effects of propagation on the Tacton of the runs, by column."""
+        return self.effects[self.kernel.tacton]
 
-def effects_of(groups: Mapping[str, Sequence[Run]]) -> dict[str, dict[str, Propagation]]:
-    """Return the effect of propagation by Tacton and body, with maps if they cost little."""
+
+def effects_of(
+    groups: Mapping[str, Sequence[Run]], maps_of: Callable[[Run], Maps]
+) -> dict[str, dict[str, Propagation]]:
+    """Return the effect of propagation by Tacton and body, with maps as far as they are known."""
     effects: dict[str, dict[str, Propagation]] = {}
     for name, group in groups.items():
         if kernel := _run_of(group, SAME_LOAD.name):
             for run in filter(lambda each: each.is_motion, group):
-                maps = quick_maps(run) if has_wavenumber_integral(run.scene) else ()
-                effects.setdefault(name, {})[run.column] = propagation(run, kernel, *maps)
+                own = propagation(run, kernel, *maps_of(run))
+                effects.setdefault(name, {})[run.column] = own
     return effects
 
 
 def first_screen(
-    groups: Mapping[str, Sequence[Run]], maps_of: Callable[[Run], Maps]
+    groups: Mapping[str, Sequence[Run]], maps_of: Callable[[Run], Maps], views: Sequence[View] = ()
 ) -> FirstScreen | None:
     """Return the first screen, or None unless a body and both kernels were run."""
     group = groups.get(first_name(groups), [])
@@ -79,15 +89,14 @@ def first_screen(
     if kernel is None or published is None or not bodies:
         return None
     maps: dict[str, SurfaceField] = {}
-    effects: dict[str, Propagation] = {}
     for run in bodies:
         if own := maps_of(run):
             maps |= {kernel.column: own[1], run.column: own[0]}
-        effects[run.column] = propagation(run, kernel, *own)
     first = FirstScreen(
-        kernel=kernel, published=published, bodies=bodies, effects=effects, maps=maps
-    )
-    if effects[first.body.column].strongest is None:
+        kernel=kernel, published=published, bodies=bodies, effects=effects_of(groups, maps_of),
+        maps=maps, views=views,
+    )  # fmt: skip
+    if first.own[first.body.column].strongest is None:
         return first
     scene, error = first.body.scene, first.body.response.expected_error
     return replace(first, shares=_shares(scene), budget=error_budget(scene, error))
@@ -102,19 +111,22 @@ def with_kernels(run: Run) -> list[Run]:
     return [*kernels, run]
 
 
+def has_quick_map(scene: Scene) -> bool:
+    """Whether the map of a body's surface needs no mesh."""
+    return scene.reading.is_plain and (has_wavenumber_integral(scene) or takes(FROM_REST, scene))
+
+
 def quick_maps(run: Run) -> Maps:
     """Return the maps of a body and of the kernel if they need no mesh."""
     scene = run.scene
-    if not (has_wavenumber_integral(scene) or (run.is_motion and takes(FROM_REST, scene))):
+    if not has_quick_map(scene):
         return ()
-    surface = _meshless_map(scene, run.model)
+    return beside_kernel(scene, _meshless_map(scene, run.model))
+
+
+def beside_kernel(scene: Scene, surface: SurfaceField) -> tuple[SurfaceField, SurfaceField]:
+    """Return the map of a body and that of the kernel under its load, at the same places."""
     return surface, kernel_map(scene.pressure, surface.x, surface.y)
-
-
-def slow_maps(scene: Scene, options: SolveOptions = DEFAULT) -> Maps:
-    """Return the maps of a body, by the modes of a plate or by elements, and of the kernel."""
-    x, y = grid(scene)
-    return body_map(scene, x, y, options), kernel_map(scene.pressure, x, y)
 
 
 def first_name(names: Iterable[str]) -> str:

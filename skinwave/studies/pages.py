@@ -142,9 +142,7 @@ def page_of(
     is_single = len(groups) == 1
     body: list[Part] = [*before, *_waveforms(figures or groups, gallery, progress), *after]
     body += tables.claims_parts(evaluate(assessable_runs(runs)))
-    effects = {} if is_single and first else effects_of(groups)
-    if first:
-        effects |= {first.kernel.tacton: dict(first.effects)}
+    effects = first.effects if first else effects_of(groups, quick_maps)
     if effects:
         body.append(Details("What propagation changes", _effects_table(effects)))
     if is_single or not effects:
@@ -234,7 +232,7 @@ def _caption(name: str, runs: Sequence[Run]) -> str:
 def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
     """Return the maps and the uncertainty of the numbers."""
     parts: list[Part] = []
-    if first.maps and first.effects[first.body.column].strongest:
+    if first.maps and first.own[first.body.column].strongest:
         figure = surfaces_figure(
             first.kernel.scene, first.maps, gallery.style, measured=first.measured
         )
@@ -272,7 +270,7 @@ def four_numbers(first: FirstScreen) -> Table:
     They are level, reach, share outside and delay. Without skin, the deflection and the spread
     replace level and reach.
     """
-    effects = list(first.effects.values())
+    effects = list(first.own.values())
     # Heading, value of the kernel, values of the bodies.
     rows: list[tuple[str, str | None, Iterable[str | None]]]
     if any(run.is_skin for run in first.bodies):
@@ -308,13 +306,13 @@ def _deflection_text(run: Run) -> str:
 
 
 def _propagation_sentence(first: FirstScreen) -> str:
-    effect = first.effects[first.body.column]
+    effect = first.own[first.body.column]
     if effect.strongest is None:
         return NO_MOTION
     name, line = label(effect.column), effect.strongest
     if effect.share is None:
         return f"The {name} moves most at {line.frequency:.0f} Hz ({line.name})."
-    others = (e for e in first.effects.values() if e.share is not None and e is not effect)
+    others = (e for e in first.own.values() if e.share is not None and e is not effect)
     also = "".join(f" ({label(each.column)}: {_share(each)})" for each in others)
     return (
         f"On the {name}, {_share(effect)} of the mean-square motion{also} lies outside the point "
@@ -346,7 +344,7 @@ def _uncertainty(first: FirstScreen) -> str:
             "Grammage, stiffness and support of the measured sheet are not published. Detection "
             "thresholds are those of skin; a sheet has no sensation level."
         )
-    if any(each.above_threshold for each in first.effects.values()):
+    if any(each.above_threshold for each in first.own.values()):
         parts.append(
             "The pressure is known to a factor of 2; distances in brackets are for half and twice "
             "the pressure."

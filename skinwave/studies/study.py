@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from simple_model import Response
+from simple_model.load.tacton import repetition_frequencies
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.measure.comparison import (
     Measured,
@@ -21,18 +22,28 @@ from skinwave.models import named
 from skinwave.models.limits import check_takes
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
+from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.planning.assessment import assess, coarser_body
 from skinwave.planning.plan import chosen_model, plan
 from skinwave.planning.simulate import compute, solve
 from skinwave.results.claims import AssessedClaim, assessable_runs, evaluate, write_claims
 from skinwave.results.files import write_lines, write_responses, write_run
+from skinwave.results.playback import played_part
 from skinwave.results.run import Run
-from skinwave.results.surface import has_wavenumber_integral
+from skinwave.results.surface import element_map, grid, map_motions
+from skinwave.results.views import View, body_view, flat_view, kernel_view
 from skinwave.scene import paper15
 from skinwave.scene.scene import Body, Scene
-from skinwave.studies.album import scene_columns
-from skinwave.studies.first_screen import Maps, first_name, first_screen, quick_maps, slow_maps
+from skinwave.studies.album import KERNEL_REACH, scene_columns
+from skinwave.studies.first_screen import (
+    Maps,
+    beside_kernel,
+    first_name,
+    first_screen,
+    has_quick_map,
+    quick_maps,
+)
 from skinwave.studies.pages import Gallery, efforts_of, page_of
 from skinwave.system import document
 from skinwave.system.effort import Progress, one_thread, peak_memory, silent
@@ -112,15 +123,11 @@ def run_study(
     failed, interrupted = dict(failures or {}), True
     prepared: dict[str, ReducedBody] = {}
     options = replace(options, model="auto", progress=silent)
+    surfaces: dict[tuple[str, str], Surface] = {}
     with one_thread(), pool(2) as workers:
-        maps = {
-            scene: workers.submit(slow_maps, scene, options)
-            for scene in scenes[first_name(scenes)].values()
-            if scene.body.of_kind.discretise and scene.reading.is_plain
-            and not has_wavenumber_integral(scene)
-        }  # fmt: skip
         with suppress(KeyboardInterrupt):
-            for run in _runs(scenes, models, options, prepared, progress, workers, failed):
+            found = _runs(scenes, models, options, prepared, progress, workers, failed, surfaces)
+            for run in found:
                 write_run(folder / run.tacton / run.column, run)
                 groups.setdefault(run.tacton, []).append(run)
             interrupted = False
@@ -136,9 +143,11 @@ def run_study(
         by_name = {f"{r.tacton}/{r.body}/{r.model}": r for r in runs}
         write_responses(folder / "responses.npz", by_name)
         first = None
-        with suppress(KeyboardInterrupt):
-            if not interrupted:
-                first = first_screen(groups, lambda run: _maps(run, maps, progress, failed))
+        if not interrupted:
+            first = first_screen(
+                groups, lambda run: surfaces.get((run.tacton, run.column), Surface()).maps,
+                _views(scenes[first_name(scenes)], surfaces),
+            )  # fmt: skip
     parts: list[document.Part] = [*more]
     figures: dict[str, Sequence[Run]] = dict(groups)
     conclusions: list[str] = []
@@ -195,26 +204,51 @@ def _completeness(model: str) -> int:
     return COMPLETENESS.index(model) if model in COMPLETENESS else -1
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Motion of a surface under one Tacton: maps of the body and of the kernel, and a view."""
+
+    maps: Maps = ()
+    view: View | None = None
+
+
+Surfaces = tuple[dict[tuple[str, str], Surface], dict[str, str]]  # by Tacton and column; failures
+
+
 def _runs(
     scenes: Scenes, models: Mapping[str, str], options: SolveOptions,
     prepared: dict[str, ReducedBody], progress: Progress, workers: Executor,
-    failures: dict[str, str],
+    failures: dict[str, str], surfaces: dict[tuple[str, str], Surface],
 ) -> Iterator[Run]:  # fmt: skip
     """Yield every run that does not fail, those of fast models first.
 
     Bodies are reduced here, once for all Tactons, into `prepared`. Workers compute the coarser
-    bodies, for the errors, and all other responses.
+    bodies, for the errors, all other responses, and the `surfaces`.
     """
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
     reduced = {column for column, model in models.items() if named(model).is_reduced}
     every.sort(key=lambda each: (each[1] in reduced, named(models[each[1]]).seconds > SLOW))
     coarse = {s.body: s for _, column, s in every if column in reduced}
     coarser = {body: workers.submit(coarser_body, s, options) for body, s in coarse.items()}
+    pictured = first_name(scenes)
+    part = _played(scenes[pictured])
+    meshed = {
+        column: {name: group[column] for name, group in scenes.items() if column in group}
+        for _, column, s in every
+        if s.body.of_kind.discretise and s.reading.is_plain and not has_quick_map(s)
+    }
+    moved = [
+        workers.submit(_element_surfaces, column, own, replace(options, model="auto"), part)
+        for column, own in meshed.items()
+    ]
     others = {
-        (name, column): workers.submit(_response, scene, replace(options, model=models[column]))
+        (name, column): workers.submit(
+            _response, name, column, scene, replace(options, model=models[column]),
+            part if name == pictured else None,
+        )
         for name, column, scene in every
         if column not in reduced
-    }
+    }  # fmt: skip
     for k, (name, column, scene) in enumerate(every):
         response = None
         if column in reduced and column not in prepared and column not in failures:
@@ -229,28 +263,71 @@ def _runs(
                 compared = coarser[scene.body].result()
                 response = assess(scene, response, body, options, compared=compared)
             else:
-                response = others[name, column].result()
+                response, shown = others[name, column].result()
+                _collect(shown, surfaces, failures)
         progress(f"response of {name} by {column}", (k + 1) / len(every))
         body_name = column if scene.body.of_kind.discretise else "none"
         if response:
             yield Run(tacton=name, body=body_name, scene=scene, response=response)
+    for column, future in zip(meshed, moved, strict=True):
+        progress(f"maps of {column}", 1.0)
+        with or_failed(failures, f"maps of {column}"):
+            _collect(future.result(), surfaces, failures)
 
 
 def _report(progress: Progress, column: str, phase: str, fraction: float) -> None:
     progress(f"{column}: {phase}", fraction)
 
 
-def _response(scene: Scene, options: SolveOptions) -> Response:
+def _played(scenes: Mapping[str, Scene]) -> tuple[float, int]:
+    """Return the part of a Tacton that its pictures play, for all its scenes."""
+    scene = scenes[SAME_LOAD.name]
+    fastest = max(repetition_frequencies(scene.tacton).values(), default=0.0)
+    return played_part(scene.pressure, fastest)
+
+
+def _response(
+    name: str, column: str, scene: Scene, options: SolveOptions, part: tuple[float, int] | None
+) -> tuple[Response, Surfaces]:
+    """Return a response and, of a body whose surface needs no mesh, its map and view."""
     if not scene.body.of_kind.discretise:
-        return compute(scene, options.model)
-    return solve(scene, plan(scene, options))
+        return compute(scene, options.model), ({}, {})
+    response = solve(scene, plan(scene, options))
+    run = Run(tacton=name, body=column, scene=scene, response=response)
+    failures: dict[str, str] = {}
+    surface = Surface()
+    with or_failed(failures, f"map of {column}"):
+        surface = Surface(maps=quick_maps(run))
+        if part and surface.maps:
+            surface = replace(surface, view=flat_view(run, KERNEL_REACH, part))
+    return response, ({(name, column): surface}, failures)
 
 
-def _maps(
-    run: Run, submitted: Mapping[Scene, Future[Maps]], progress: Progress, failures: dict[str, str]
-) -> Maps:
-    """Return the maps of a body and of the kernel, or none if they fail."""
-    with or_failed(failures, name := f"map of {run.column}"):
-        progress(name, 0.0)
-        return submitted[run.scene].result() if run.scene in submitted else quick_maps(run)
-    return ()
+def _element_surfaces(
+    column: str, scenes: Mapping[str, Scene], options: SolveOptions, part: tuple[float, int]
+) -> Surfaces:
+    """Return the maps of one meshed body under all Tactons, and one view."""
+    names, failures = {scene: name for name, scene in scenes.items()}, dict[str, str]()
+    surfaces: dict[tuple[str, str], Surface] = {}
+    with or_failed(failures, f"map of {column}"):
+        for scene, motion in map_motions(list(scenes.values()), options):
+            view, name = None, names[scene]
+            if name == first_name(scenes):
+                view = replace(body_view(scene, column, motion, part), moved=None)
+            maps = beside_kernel(scene, element_map(scene, motion, *grid(scene)))
+            surfaces[name, column] = Surface(maps=maps, view=view)
+    return surfaces, failures
+
+
+def _collect(
+    found: Surfaces, surfaces: dict[tuple[str, str], Surface], failures: dict[str, str]
+) -> None:
+    surfaces.update(found[0])
+    failures.update(found[1])
+
+
+def _views(scenes: Mapping[str, Scene], surfaces: Mapping[tuple[str, str], Surface]) -> list[View]:
+    """Return the views of the kernel and of the bodies under one Tacton, if there are any."""
+    own = [view for each in surfaces.values() if (view := each.view)]
+    kernel = kernel_view(scenes[SAME_LOAD.name], KERNEL_REACH, _played(scenes))
+    return [kernel, *own] if own else []
