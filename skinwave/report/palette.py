@@ -10,12 +10,14 @@ import matplotlib as mpl
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 
 BLUE, ORANGE = "#0072B2", "#D55E00"
-SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+GREEN = "#009E73"
+SPARE = (GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 SERIES = (BLUE, ORANGE, *SPARE)  # of other curves
 COLOURS = {
     **{model.name: model.colour for model in (SAME_LOAD, PUBLISHED)},
     "paper-sheet": ORANGE,
     "skin-slab": BLUE,
+    "palm": GREEN,
     "measured": "#CC79A7",
 }
 DASHES: dict[str, Any] = {"paper-sheet": (0, (5, 1))}  # of waveforms, for print in grey

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image as Pillow
 from PIL import features
@@ -20,7 +21,7 @@ from simple_model.numbers import interval, percent, significant
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.models import named
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
-from skinwave.report import description
+from skinwave.report import description, render
 from skinwave.report.figures import REPORT, figure_file
 from skinwave.report.maps import (
     CAPTION,
@@ -30,14 +31,16 @@ from skinwave.report.maps import (
     surfaces_figure,
 )
 from skinwave.report.palette import label
+from skinwave.report.renderer import renderer
 from skinwave.report.spectra import levels_figure, strongest_probe, tacton_figure
 from skinwave.report.styles import Style
 from skinwave.results.claims import assessable_runs, evaluate
 from skinwave.results.files import distinct_names, fill
 from skinwave.results.propagation import NEAR, OUTSIDE, Component, Propagation, Reach, added_lines
 from skinwave.results.run import Run
+from skinwave.results.views import View
 from skinwave.scene.file import dumps
-from skinwave.studies import tables
+from skinwave.studies import overview, tables
 from skinwave.studies.first_screen import (
     FirstScreen,
     effects_of,
@@ -57,17 +60,24 @@ from skinwave.system.document import (
     preformat,
 )
 from skinwave.system.effort import Progress, silent
+from skinwave.system.failures import or_failed
 from skinwave.system.table import Table
 
+MARKS = "Black: path and focus; yellow: probes."
+COMPARED = (
+    "Colour: motion into the body (mean removed) or pressure of the kernel, relative to the "
+    "largest value of each model. All models receive the same load."
+)
 PICTURES = "pictures"  # folder of a page's figures
 QUALITY = 88  # of pictures inside a page
 NAMED = 3  # lines that a sentence names
 NO_MOTION = "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
 ABOUT_MAPS = (
-    "Shares and spreads come from maps that reach 44 mm from the origin along x and y. The map of "
-    "a slab is that of a laterally infinite layer. For other bodies only the Tacton above has a "
-    "map. The strongest component is the largest over all probes. Its phase delay is known "
-    "up to whole periods, and includes the phase lag of the body."
+    "Shares and spreads come from maps that reach 44 mm from the origin along x and y; areas and "
+    "distances on a curved body are those along its surface. The map of a slab is that of a "
+    "laterally infinite layer. The strongest component is the largest over all probes. The phase "
+    "delay, that of the kernel's strongest component, is known up to whole periods, and includes "
+    "the phase lag of the body; below 0 the body is ahead."
 )
 WAVEFORMS = "Waveforms and spectra; each row is a probe."
 LOADS = (
@@ -124,7 +134,7 @@ def page_of(
     notes: Sequence[Part] = (),
     seconds: float | None = None,
     progress: Progress = silent,
-    failures: Mapping[str, str] | None = None,
+    failures: dict[str, str] | None = None,
 ) -> Report:
     """Return the page of runs by Tacton.
 
@@ -138,7 +148,7 @@ def page_of(
     seconds : duration of all runs, the sum of their efforts if not given
     failures : reasons of parts that failed
     """
-    runs = [run for group in groups.values() for run in group]
+    runs, failures = [run for group in groups.values() for run in group], failures or {}
     is_single = len(groups) == 1
     body: list[Part] = [*before, *_waveforms(figures or groups, gallery, progress), *after]
     body += tables.claims_parts(evaluate(assessable_runs(runs)))
@@ -161,13 +171,19 @@ def page_of(
     parts: list[Part] = [contents(body), *caveats, *body]
     verdict: list[str] = []
     if first:
-        verdict = sentences(first)
-        parts[1:1] = _first_parts(first, gallery)
-        parts.insert(0, four_numbers(first))
-        if not is_single:
-            verdict[0] = f"Tacton {first.kernel.tacton}, one of {len(groups)}. {verdict[0]}"
+        own: list[Part] = [four_numbers(first), *_first_parts(first, gallery)]
+        spatial = _spatial_parts(first, gallery, failures)
+        if is_single:
+            verdict = sentences(first)
+            parts = [own[0], parts[0], *own[1:2], *spatial, *own[2:], *parts[1:]]
+        else:
+            verdict = [*overview.sentences(effects, groups), *sentences(first)[1:]]
+            drawn = overview.figure(effects, gallery.style)
+            numbers = gallery.figure("numbers", drawn, overview.ABOUT)
+            detail = Section(f"One of them: {first.kernel.tacton}", own)
+            parts = [overview.table(effects), numbers, parts[0], *spatial, detail, *parts[1:]]
     shown = [" ".join(verdict)] if verdict else []
-    return Report(title, shown, parts, efforts_of(runs), PICTURES, failures or {})
+    return Report(title, shown, parts, efforts_of(runs), PICTURES, failures)
 
 
 def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
@@ -245,6 +261,27 @@ def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
     return [*parts, _uncertainty(first)]
 
 
+def _spatial_parts(first: FirstScreen, gallery: Gallery, failures: dict[str, str]) -> list[Part]:
+    """Return the picture of the views at the instant when the body moves most, if there are any."""
+    if not first.views:
+        return []
+    if not renderer().is_available:
+        return [f"Three-dimensional pictures are left out: {renderer().detail}."]
+    own = next((v for v in first.views if v.column == first.body.column), first.views[-1])
+    with or_failed(failures, "picture in three dimensions"):
+        frame = int(np.abs(own.inward).max(axis=1).argmax())
+        return [side_by_side(first.views, frame, gallery)]
+    return []
+
+
+def side_by_side(views: Sequence[View], frame: int, gallery: Gallery) -> Picture:
+    """Return a picture of views in three dimensions at one frame."""
+    scales = (f"{label(view.column)}: {render.scale_text(view)}" for view in views)
+    peaks = (f"{label(view.column)} {view.quantity.text(view.peak)}" for view in views)
+    caption = f"{'; '.join(scales)}. Largest values: {', '.join(peaks)}. {MARKS} {COMPARED}"
+    return gallery.image("side-by-side", render.picture(views, gallery.style, frame), caption)
+
+
 def _free_vibration(runs: Iterable[Run]) -> str:
     """Return a sentence on the strongest free vibration of each body, which maps leave out."""
     strongest = {}
@@ -273,12 +310,14 @@ def four_numbers(first: FirstScreen) -> Table:
     effects = list(first.own.values())
     # Heading, value of the kernel, values of the bodies.
     rows: list[tuple[str, str | None, Iterable[str | None]]]
+    unknown = f"none ({overview.NOT_SKIN})"
     if any(run.is_skin for run in first.bodies):
-        levels = (_sensation_text(each.highest_sensation) for each in effects)
+        levels = (_sensation_text(each.highest_sensation) or unknown for each in effects)
+        reaches = (_threshold_text(each) or unknown for each in effects)
         rows = [
-            ("highest sensation level at the probes", None, levels),
-            ("reach above threshold, from the path", None, map(_threshold_text, effects)),
-        ]  # fmt: skip
+            ("highest sensation level at the probes", overview.OF_PRESSURE, levels),
+            ("reach above threshold, from the path", overview.OF_PRESSURE, reaches),
+        ]
     else:
         rows = [
             ("largest displacement at the probes", None, map(_deflection_text, first.bodies)),
@@ -288,8 +327,7 @@ def four_numbers(first: FirstScreen) -> Table:
     rows += [
         (f"share of motion outside the kernel's {OUTSIDE:g} dB region",
          None if effects[0].share is None else "0 %", map(_share, effects)),
-        ("delay of the strongest component", "0 ms",
-         (ms and f"{ms} ms" for ms in map(_millisecond, effects))),
+        (f"delay of {_line_text(effects[0].kernel_strongest)}", "0 ms", map(_delay_text, effects)),
     ]  # fmt: skip
     name = f"{first.kernel.tacton}, same load"
     columns = [name, "point kernel", *(label(each.column) for each in effects)]
@@ -382,6 +420,18 @@ def _millisecond(effect: Propagation) -> str | None:
     return None if effect.delay is None else significant(1e3 * effect.delay, 2)
 
 
+def _line_text(component: Component | None) -> str:
+    """Return the kernel's strongest line, of which delays are."""
+    return f"{component.name} ({component.frequency:.0f} Hz)" if component else "the strongest line"
+
+
+def _delay_text(effect: Propagation) -> str:
+    """Return the phase delay, or why there is none."""
+    if (ms := _millisecond(effect)) is None:
+        return "none (too weak at the probes)"
+    return f"{ms} ms" + ", ahead of the kernel" * (effect.delay is not None and effect.delay < 0)
+
+
 def _millimetre(reach: Reach | None) -> str | None:
     return None if reach is None else f"{'> ' * reach.beyond}{1e3 * reach.metre:.0f}"
 
@@ -401,7 +451,7 @@ def _effects_table(effects: Mapping[str, Mapping[str, Propagation]]) -> list[Par
     ]  # fmt: skip
     columns = [
         "Tacton", "body", "share outside", "spread, kernel, mm", "spread, body, mm",
-        "phase delay of the strongest component, ms", "strongest component, kernel",
+        "phase delay of that component, ms", "strongest component, kernel",
         "strongest component, body", "highest sensation level",
     ]  # fmt: skip
     return [ABOUT_MAPS, Table(columns, rows)]

@@ -33,7 +33,7 @@ from skinwave.scene.scene import Scene
 from skinwave.studies import dispersion
 from skinwave.studies.album import Album, open_album, select_columns
 from skinwave.studies.first_screen import Maps, first_screen, with_kernels
-from skinwave.studies.pages import Gallery, page_of
+from skinwave.studies.pages import MARKS, Gallery, page_of, side_by_side
 from skinwave.system.document import Choice, Details, Part, Picture, Report, Section, inner_page
 from skinwave.system.effort import Progress
 from skinwave.system.failures import or_failed
@@ -49,11 +49,6 @@ TURNED = (
     "Turn it with the mouse, a finger or the arrow keys. Colour: motion about its mean, red into "
     "the body, blue out of it. If the legend has ≥, larger values have the end colour. Black: path "
     "and focus; orange: probes."
-)
-MARKS = "Black: path and focus; yellow: probes."
-COMPARED = (
-    "Colour: motion into the body (mean removed) or pressure of the kernel, relative to the "
-    "largest value of each model. All models receive the same load."
 )
 SNAPSHOTS = (
     "The surface when the body moves most, then at quarters of a turn of the focus, or of a period "
@@ -130,12 +125,8 @@ def _spatial_parts(
     """Return three-dimensional pictures at a frame, and the film, without those that fail."""
     parts: dict[str, Part] = {}
     progress("draw side by side", 0.0)
-    scales = (f"{label(view.column)}: {render.scale_text(view)}" for view in views)
-    peaks = (f"{label(view.column)} {view.quantity.text(view.peak)}" for view in views)
-    caption = f"{'; '.join(scales)}. Largest values: {', '.join(peaks)}. {MARKS} {COMPARED}"
     with or_failed(failures, "picture side by side"):
-        pixels = render.picture(views, gallery.style, frame)
-        parts["side by side"] = gallery.image("side-by-side", pixels, caption)
+        parts["side by side"] = side_by_side(views, frame, gallery)
     with or_failed(failures, "film"):
         parts["film"] = _film(own, views, gallery.style, progress)
     if not len(own.tets):

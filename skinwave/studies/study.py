@@ -227,7 +227,7 @@ def _runs(
     """
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
     reduced = {column for column, model in models.items() if named(model).is_reduced}
-    every.sort(key=lambda each: (each[1] in reduced, named(models[each[1]]).seconds > SLOW))
+    every.sort(key=lambda each: (named(models[each[1]]).seconds > SLOW, each[1] not in reduced))
     coarse = {s.body: s for _, column, s in every if column in reduced}
     coarser = {body: workers.submit(coarser_body, s, options) for body, s in coarse.items()}
     pictured = first_name(scenes)
