@@ -111,7 +111,9 @@ def run_study(
     """Run every scene, write each run when it is finished, then write tables and page.
 
     Each body has one model: the given one, finite elements if their size is given, or the most
-    complete one that plans choose for its scenes. A measurement is compared with the models of its
+    complete one that plans choose for its scenes. A body of one scene is planned as by `run`; one
+    of several has elements of the given size, of that in `paper15.SIZES`, or of the default size. A
+    measurement is compared with the models of its
     Tacton. `more` are further parts of the page; `failures` are of parts made before. After an
     interrupt or a failure, the other runs are compared and written; raises a ValueError if all
     fail.
@@ -228,8 +230,12 @@ def _runs(
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
     reduced = {column for column, model in models.items() if named(model).is_reduced}
     every.sort(key=lambda each: (named(models[each[1]]).seconds > SLOW, each[1] not in reduced))
-    coarse = {s.body: s for _, column, s in every if column in reduced}
-    coarser = {body: workers.submit(coarser_body, s, options) for body, s in coarse.items()}
+    several, size_of = (
+        len(scenes) > 1,
+        {column: replace(options, h=options.h or paper15.SIZES.get(column)) for column in reduced},
+    )
+    coarse = {column: s for _, column, s in every if several and column in reduced}
+    coarser = {c: workers.submit(coarser_body, s, size_of[c]) for c, s in coarse.items()}
     pictured = first_name(scenes)
     part = _played(scenes[pictured])
     meshed = {
@@ -252,17 +258,23 @@ def _runs(
     for k, (name, column, scene) in enumerate(every):
         response = None
         if column in reduced and column not in prepared and column not in failures:
-            reporting = replace(options, progress=partial(_report, progress, column))
+            reporting = replace(size_of[column], progress=partial(_report, progress, column))
             with or_failed(failures, column):
-                prepared[column] = prepare(scene, reporting)
+                if several:
+                    prepared[column] = prepare(scene, reporting)
+                else:
+                    planned = plan(scene, replace(reporting, model=models[column]))
+                    response = solve(scene, planned)
+                    if planned.prepared:
+                        prepared[column] = planned.prepared
         if column in reduced and column not in prepared:
             continue  # all Tactons on this body failed
         with or_failed(failures, f"{name} on {column}"):
-            if column in reduced:
+            if column in reduced and several:
                 response, body = answer(prepared[column], scene), prepared[column]
-                compared = coarser[scene.body].result()
-                response = assess(scene, response, body, options, compared=compared)
-            else:
+                compared = coarser[column].result()
+                response = assess(scene, response, body, size_of[column], compared=compared)
+            elif column not in reduced:
                 response, shown = others[name, column].result()
                 _collect(shown, surfaces, failures)
         progress(f"response of {name} by {column}", (k + 1) / len(every))
