@@ -20,6 +20,7 @@ from simple_model.choices import choose
 from simple_model.drawing import new_axes
 from simple_model.numbers import plural, significant
 from simple_model.quantities import DISPLACEMENT, VELOCITY
+from simple_model.response import UNEVEN
 from skinwave.models import named
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import oscillating
@@ -324,7 +325,7 @@ def _checked_times(times: ArrayLike, duration: float) -> Floats:
     given = np.array(times, np.float64)
     if given.ndim != 1 or not len(given) or not np.isfinite(given).all():
         raise ValueError(f"times have shape {given.shape}; give (t,) finite numbers in s")
-    if not (given[0] >= 0 and given[-1] <= duration and (np.diff(given) > 0).all()):
+    if not (given[0] >= 0 and given[-1] <= duration * (1 + UNEVEN) and (np.diff(given) > 0).all()):
         raise ValueError(
             f"times from {given[0]:g} to {given[-1]:g} s do not ascend within 0..{duration:g} s, "
             "the duration of the Tacton; give ascending times within it"
