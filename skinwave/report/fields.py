@@ -63,20 +63,26 @@ class Field:
     """Motion of a whole body from rest at some times, and the load on its surface.
 
     Displacement is computed when it is first read, velocity and strain at the times at which they
-    are converted or saved.
+    are converted or saved. Raises a ValueError if the times do not ascend within the duration.
 
     Parameters
     ----------
     scene : Scene
     moved : BodyMotion, the body's motion at any time
     times : (t,) float, s; `dataclasses.replace` with others computes nothing again but the motion
-    effort : Effort, with the expected error of the displacement
+    effort : Effort; its expected error is that of the displacement at the scene's probes, or of
+        the response that was given; those of velocity and strain may be larger
     """
 
     scene: Scene
     moved: BodyMotion
     times: Floats
     effort: Effort
+
+    def __post_init__(self) -> None:
+        times = _checked_times(self.times, self.scene.tacton.duration)
+        times.setflags(write=False)
+        object.__setattr__(self, "times", times)
 
     @property
     def mesh(self) -> TetMesh:

@@ -298,7 +298,9 @@ def test_a_field_takes_size_and_error_of_a_response(field, small, monkeypatch):
 
 
 @pytest.mark.parametrize("times", [[], [0.0, np.nan], [0.01, 0.0], [-0.01, 0.0], [0.0, 0.06]])
-def test_times_of_a_field_ascend_within_the_tacton(small, times):
+def test_times_of_a_field_ascend_within_the_tacton(field, small, times):
+    with pytest.raises(ValueError, match="times"):
+        replace(field, times=times)
     with pytest.raises(ValueError, match="times"):
         skinwave.field(small, times, 0.5, h=6e-3)
 
