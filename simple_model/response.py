@@ -23,6 +23,7 @@ from simple_model.typing import Bools, Complex, Floats, Ints
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -170,22 +171,42 @@ class Response:
         ax.set_ylabel(f"{self.record.words}, {self.record.shown}")
         return ax
 
-    def to_pandas(self) -> pd.DataFrame:
-        """Return the values as a data frame: rows by time_s, columns by x_m and y_m of the probes.
-        Its `attrs` have unit, quantity, model, error and warnings.
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the values as a data frame of pandas: rows by time_s, columns by x_m and y_m of
+        the probes. Its `attrs` are those of `to_xarray`.
         """
-        pandas = library("pandas")
         names = [f"{axis}_m" for axis in "xyz"[: self.probes.shape[1]]]
+        pandas = library("pandas")
         frame = pandas.DataFrame(
             self.values.copy(),
             index=pandas.Index(self.times.copy(), name="time_s"),
             columns=pandas.MultiIndex.from_arrays(self.probes.T.copy(), names=names),
         )
-        frame.attrs = {
-            "units": self.unit, "quantity": self.quantity, "model": self.model,
-            "expected_error": self.expected_error, "warnings": self.effort.warnings,
-        }  # fmt: skip
+        frame.attrs = self._attributes
         return frame
+
+    def to_xarray(self) -> xr.DataArray:
+        """Return the values as an array of xarray with dimensions time and probe.
+
+        Coordinates are the time in s, and x and y of the probes in m. The attributes are units,
+        long_name, quantity, model, expected_error (inf if unknown) and warnings, one on each line.
+        All are text or numbers, so that `to_netcdf` writes them.
+        """
+        columns = zip("xyz", self.probes.T.copy(), strict=False)
+        coords = {axis: ("probe", at, {"units": "m"}) for axis, at in columns}
+        time = ("time", self.times.copy(), {"units": "s"})
+        return library("xarray").DataArray(
+            self.values.copy(), {"time": time, **coords}, ("time", "probe"), self.quantity,
+            self._attributes,
+        )  # fmt: skip
+
+    @property
+    def _attributes(self) -> dict[str, Any]:
+        return {
+            "units": self.unit, "long_name": self.record.words, "quantity": self.quantity,
+            "model": self.model, "expected_error": self.expected_error,
+            "warnings": "\n".join(self.effort.warnings),
+        }  # fmt: skip
 
     def __repr__(self) -> str:
         record, times = self.record, self.times

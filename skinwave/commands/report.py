@@ -141,7 +141,6 @@ def _map(options: argparse.Namespace) -> int:
 
 def _film(options: argparse.Namespace) -> int:
     from skinwave.report.films import check_format, film, played_text
-    from skinwave.report.renderer import renderer
     from skinwave.report.styles import style
     from skinwave.results.outputs import output_path
 
@@ -150,8 +149,6 @@ def _film(options: argparse.Namespace) -> int:
     check_format(out)
     if options.frames is not None and not 2 <= options.frames <= 1000:
         raise ValueError(f"--frames is {options.frames}; give a number from 2 to 1000")
-    if not renderer().is_available:
-        raise ValueError(f"this machine cannot draw a film: {renderer().detail}")
     with (
         output_path(out, overwrite=options.overwrite, inputs=[source]) as aside,
         progress_of(options) as progress,

@@ -37,7 +37,7 @@ from skinwave.bodies.parts import FLAT
 from skinwave.models.sheet_probes import sheet_rows
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import Reading
-from skinwave.system.effort import Clock, Progress, peak_memory, versions
+from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, versions
 from skinwave.typing import Floats
 
 MOST_IMBALANCE = 0.01  # relative error of the energy balance, above which a response is refused
@@ -54,7 +54,7 @@ def mesh_body(
     discretise: Discretise | None = None,
 ) -> Build:
     """Mesh a body with `bodies.build.build`, timed and reported."""
-    with clock("mesh"):
+    with clock("mesh"), one_thread():
         report("mesh", 0.0)
         return build_body(body, h, symmetry, discretise)
 

@@ -69,12 +69,17 @@ def element_parts(
         cure = "provide a finer mesh and compare the results"
     return [
         ErrorPart(name="mesh", source=elements, error=mesh, cure=cure),
-        ErrorPart(name="reduction", source="the reduced-order model", error=reduction,
-                  cure="lower the tolerance"),
+        reduction_part(reduction),
         ErrorPart(name="absorbing layer", source="the absorbing layer", error=absorbing,
                   cure="use a larger body"),
         band_part(scene, BAND, above_band),
     ]  # fmt: skip
+
+
+def reduction_part(error: float) -> ErrorPart:
+    """Return the part due to the reduction of a body."""
+    source = "the reduced-order model"
+    return ErrorPart(name="reduction", source=source, error=error, cure="lower the tolerance")
 
 
 def element_warnings(scene: Scene, h: float) -> tuple[str, ...]:

@@ -3,27 +3,47 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from meshes import TetMesh
 from meshes.tetmesh import facet_set
-from simple_model import Effort
+from simple_model import Effort, Response, Statement
+from simple_model.choices import choose
 from simple_model.drawing import new_axes
 from simple_model.numbers import plural, significant
-from simple_model.quantities import DISPLACEMENT
+from simple_model.quantities import DISPLACEMENT, VELOCITY
+from simple_model.response import UNEVEN
+from skinwave.models import named
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import from_rest, oscillating
+from skinwave.models.reduced import oscillating
 from skinwave.planning.assessment import assess
+from skinwave.planning.errors import element_warnings, reduction_part
+from skinwave.planning.plan_warnings import stated
+from skinwave.report.films import Film, check_format, film
 from skinwave.report.palette import SIGNED
-from skinwave.results.exports import collection
+from skinwave.report.render import CAMERAS
+from skinwave.report.styles import style
+from skinwave.results.exports import PARAVIEW_ORDER, collection
 from skinwave.results.files import folder_name
-from skinwave.results.motion import check_values, probe_lines, probe_response, whole_motion
-from skinwave.results.outputs import output_file
-from skinwave.results.views import split
+from skinwave.results.motion import (
+    BodyMotion,
+    check_values,
+    motion_from_rest,
+    probe_lines,
+    probe_response,
+    strain_from_rest,
+    whole_motion,
+)
+from skinwave.results.outputs import output_file, output_path
+from skinwave.results.views import motion_view, split
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning, silent
 from skinwave.system.progress_bar import progress_callback
@@ -33,36 +53,46 @@ if TYPE_CHECKING:
     import pyvista as pv
     from matplotlib.axes import Axes
 
+AT_ONCE = 32  # times at which velocity and strain are computed together
+UNITS = {"displacement": "m", "velocity": "m/s", "strain": "1", "pressure": "Pa"}
 SLACK = 0.5  # sampling intervals by which a time may lie outside those of a field
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Field:
-    """Motion of a whole body.
+    """Motion of a whole body from rest at some times, and the load on its surface.
+
+    Displacement is computed when it is first read, velocity and strain at the times at which they
+    are converted or saved. Raises a ValueError if the times do not ascend within the duration.
 
     Parameters
     ----------
-    mesh : TetMesh
-    times : (t,) float, s
-    displacement : (t, n, 3) float, m, of the nodes of `mesh`
-    effort : Effort
-
-    Examples
-    --------
-    >>> import meshes, numpy as np
-    >>> from simple_model import Effort
-    >>> block = meshes.tag_boundary(meshes.block((4e-3, 4e-3, 2e-3), 2e-3))
-    >>> times = np.array([0.0, 1e-3])
-    >>> moved = 1e-6 * times[:, None, None] / 1e-3 * np.ones((2, len(block.points), 3))
-    >>> field = Field(mesh=block, times=times, displacement=moved, effort=Effort())
-    >>> field.frame(), field.frame(0.0)
-    (1, 0)
+    scene : Scene
+    moved : BodyMotion, the body's motion at any time
+    times : (t,) float, s; `dataclasses.replace` with others computes nothing again but the motion
+    effort : Effort; its expected error is that of the displacement at the scene's probes, or of
+        the response that was given; those of velocity and strain may be larger
     """
 
-    mesh: TetMesh
+    scene: Scene
+    moved: BodyMotion
     times: Floats
-    displacement: Floats
     effort: Effort
+
+    def __post_init__(self) -> None:
+        times = _checked_times(self.times, self.scene.tacton.duration)
+        times.setflags(write=False)
+        object.__setattr__(self, "times", times)
+
+    @property
+    def mesh(self) -> TetMesh:
+        """Mesh of the body."""
+        return self.moved.mesh
+
+    @cached_property
+    def displacement(self) -> Floats:
+        """Displacement (t, n, 3) in m of the nodes of `mesh`."""
+        return motion_from_rest(self.moved, self.times)
 
     @property
     def expected_error(self) -> float:
@@ -97,14 +127,39 @@ class Field:
         return int(np.argmin(np.abs(times - time)))
 
     def to_pyvista(self, time: float | None = None) -> pv.UnstructuredGrid:
-        """Return the mesh at rest in m with its `displacement` (n, 3) in m.
+        """Return the mesh at rest in m, with the data of `grids`, at a time chosen by `frame`."""
+        return next(self.grids([self.times[self.frame(time)]]))
 
-        The frame is chosen as in `frame`; the field data `time_s` is its time.
+    def grids(self, times: Sequence[float] | None = None) -> Iterator[pv.UnstructuredGrid]:
+        """Yield the mesh at rest in m at each of some times in s, or at all.
+
+        The times are chosen as in `frame`. Data of the nodes are `displacement` (n, 3) in m,
+        `velocity` (n, 3) in m/s, `pressure` (n,) in Pa, 0 below the surface, and for a solid
+        `strain` (n, 6), tension positive, in the order XX, YY, ZZ, XY, YZ, XZ. At an interface of
+        materials strain is the mean of both sides. A sheet has none, because its mesh is thicker
+        than the sheet. Field data are `time_s` and `units`.
         """
-        grid, k = self.mesh.to_pyvista(), self.frame(time)
-        grid.point_data["displacement"] = self.displacement[k]
-        grid.field_data["time_s"] = self.times[k : k + 1]
-        return grid
+        frames = [self.frame(time) for time in (self.times if times is None else times)]
+        top = np.unique(self.mesh.facets["top"])
+        for start in range(0, len(frames), AT_ONCE):
+            some = frames[start : start + AT_ONCE]
+            now = self.times[some]
+            pressure = np.zeros((len(some), len(self.mesh.points)))
+            pressure[:, top] = self.scene.pressure(self.mesh.points[top], now)
+            data = {
+                "displacement": self.displacement[some],
+                "velocity": motion_from_rest(self.moved, now, VELOCITY),
+                "pressure": pressure,
+            }
+            if not self.scene.body.of_kind.is_plate:
+                data["strain"] = strain_from_rest(self.moved, now)[..., PARAVIEW_ORDER]
+            for k, time in enumerate(now):
+                grid = self.mesh.to_pyvista()
+                for name, values in data.items():
+                    grid.point_data[name] = values[k]
+                grid.field_data["time_s"] = [time]
+                grid.field_data["units"] = [f"{name}: {UNITS[name]}" for name in data]
+                yield grid
 
     def plot(self, time: float | None = None, *, ax: Axes | None = None) -> Axes:
         """Draw the displacement of the upper surface into the body, seen from above.
@@ -131,7 +186,8 @@ class Field:
         return ax
 
     def save(self, path: str | Path, frames: int | None = None, *, overwrite: bool = False) -> Path:
-        """Write a ParaView collection, `path` ending in .pvd, and a .vtu file for each time.
+        """Write a ParaView collection, `path` ending in .pvd, and a .vtu file of `grids` for each
+        time.
 
         Parameters
         ----------
@@ -148,24 +204,61 @@ class Field:
         ValueError
             If the path has another suffix, or a file exists and `overwrite` is False.
         """
-        path, count = Path(path), len(self.times)
+        path, times = Path(path), self._some(frames).tolist()
         if path.suffix != ".pvd":
             raise ValueError(f"'{path.name}' must end in .pvd")
-        if frames is not None and frames < 1:
-            raise ValueError(f"frames = {frames} must be 1 or more")
-        chosen = np.unique(np.linspace(0, count - 1, min(frames or count, count)).round())
-        times = self.times[chosen.astype(int)].tolist()
         names = [f"{folder_name(path.stem)}_{k:04d}.vtu" for k in range(len(times))]
-        existing = [name for name in (path.name, *names) if (path.parent / name).exists()]
-        if existing and not overwrite:
-            raise ValueError(
-                f"{path.parent / existing[0]} exists. Give another name or overwrite=True"
-            )
-        for name, time in zip(names, times, strict=True):
-            self.to_pyvista(time).save(path.parent / name)
+        _check_new([path, *(path.parent / name for name in names)], overwrite)
+        for name, grid in zip(names, self.grids(times), strict=True):
+            grid.save(path.parent / name)
         with output_file(path, overwrite=overwrite) as file:
             file.write(collection(names, times).encode())
         return path
+
+    def animate(
+        self, path: str | Path | None = None, frames: int | None = None, *,
+        camera: str = "tilted", overwrite: bool = False, progress: Progress | bool | None = None,
+    ) -> Film:  # fmt: skip
+        """Return a film of the motion, which a notebook plays, and write it if there is a path.
+
+        Parameters
+        ----------
+        path : str or Path, ending in .gif or .mp4; if not given, the film is a GIF
+        frames : int, number of evenly spaced times; all if not given
+        camera : str, "tilted", "front" or "top"
+        overwrite : bool
+        progress : see `simulate`
+
+        Raises
+        ------
+        ValueError
+            If the film cannot be drawn or written, or the file exists and `overwrite` is False.
+        """
+        choose("camera", camera, CAMERAS)
+        shown = replace(self, times=self._some(frames))
+        kind = self.scene.body.kind
+        with TemporaryDirectory() as folder, progress_callback(progress) as report:
+            target = Path(path or Path(folder, "film.gif"))
+            check_format(target)
+            _check_new([target], overwrite)
+            view = motion_view(self.scene, kind, self.moved, shown.times, shown.displacement)
+            with output_path(target, overwrite=overwrite) as aside:
+                film(aside, [view], style("report"), report, camera=camera)
+            return Film(frames=len(view.times), suffix=target.suffix, data=target.read_bytes())
+
+    def _some(self, frames: int | None) -> Floats:
+        """Return some evenly chosen times, or all."""
+        if frames is not None and frames < 1:
+            raise ValueError(f"frames = {frames} must be 1 or more")
+        count = len(self.times)
+        chosen = np.unique(np.linspace(0, count - 1, min(frames or count, count)).round())
+        return self.times[chosen.astype(int)]
+
+
+def _check_new(paths: Sequence[Path], overwrite: bool) -> None:
+    existing = [path for path in paths if path.exists()]
+    if existing and not overwrite:
+        raise ValueError(f"{existing[0]} exists. Give another name or overwrite=True")
 
 
 def field(
@@ -176,6 +269,7 @@ def field(
     *,
     h: float | None = None,
     solver: str = "auto",
+    response: Response | None = None,
 ) -> Field:
     """Compute the motion of a scene's whole body from rest.
 
@@ -186,8 +280,11 @@ def field(
     Parameters
     ----------
     scene : Scene
-    times : (t,) float, s, equally spaced from 0
+    times : (t,) float, s, ascending, within the duration of the Tacton
     tolerance, progress, h, solver : see `simulate`
+    response : Response of a model of linear elements to the scene, such as of
+        `simulate(scene, "fem")`; the field then has the size of its elements and its expected
+        error, and no other mesh is solved
 
     Returns
     -------
@@ -196,8 +293,8 @@ def field(
     Raises
     ------
     ValueError
-        If the scene has no body, if a number is out of range, or if the tolerance cannot be
-        reached.
+        If the scene has no body, if a number is out of range, if the tolerance cannot be reached,
+        or if the response is not of linear elements under the load of the scene.
 
     Examples
     --------
@@ -208,16 +305,52 @@ def field(
     >>> float((1e6 * abs(field.displacement).max()).round(1))  # um
     4.2
     """
+    times = _checked_times(times, scene.tacton.duration)
+    if response is not None:
+        h = _element_size(scene, response, h)
     with progress_callback(progress) as report:
         options = SolveOptions(h=h, tolerance=tolerance, solver=solver, progress=report)
         moved = whole_motion(scene, options)
     check_values(len(times), len(moved.mesh.points))
-    displacement = (from_rest(moved.motion, times) @ moved.own_basis.T).reshape(len(times), -1, 3)
     surface = replace(scene, depth=0.0, quantity=DISPLACEMENT.name)  # the error is that of motion
-    response = probe_response(surface, moved)
-    held = scene.body.is_held  # the mean of an unconstrained body grows; its lines are compared
-    compared = response.values if held else oscillating(probe_lines(surface, moved)).lines
-    response = assess(surface, response, compared, replace(options, progress=silent))
-    for sentence in response.effort.warnings:
+    own = probe_response(surface, moved)
+    if response is None:
+        held = scene.body.is_held  # the mean of an unconstrained body grows; its lines are compared
+        compared = own.values if held else oscillating(probe_lines(surface, moved)).lines
+        own = assess(surface, own, compared, replace(options, progress=silent))
+    else:
+        parts = response.effort.errors.with_parts([reduction_part(own.effort.estimate)]).parts
+        statement = Statement(parts=parts, tolerance=tolerance)
+        own = stated(surface, own, statement, element_warnings(surface, response.effort.h))
+    for sentence in own.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
-    return Field(mesh=moved.mesh, times=times, displacement=displacement, effort=response.effort)
+    return Field(scene=scene, moved=moved, times=times, effort=own.effort)
+
+
+def _checked_times(times: ArrayLike, duration: float) -> Floats:
+    given = np.array(times, np.float64)
+    if given.ndim != 1 or not len(given) or not np.isfinite(given).all():
+        raise ValueError(f"times have shape {given.shape}; give (t,) finite numbers in s")
+    if not (given[0] >= 0 and given[-1] <= duration * (1 + UNEVEN) and (np.diff(given) > 0).all()):
+        raise ValueError(
+            f"times from {given[0]:g} to {given[-1]:g} s do not ascend within 0..{duration:g} s, "
+            "the duration of the Tacton; give ascending times within it"
+        )
+    return given
+
+
+def _element_size(scene: Scene, response: Response, h: float | None) -> float:
+    """Return the element size in m of a response; raise a ValueError if it is of no use."""
+    size, load = response.effort.h, response.load
+    if not (size and named(response.model).is_refined):
+        raise ValueError(
+            f"the response is of {response.model}, not of linear elements; give that of "
+            "simulate(scene, 'fem')"
+        )
+    if load != scene.pressure:
+        raise ValueError("the response is to another load; give one to the load of the scene")
+    if h not in (None, size):
+        raise ValueError(
+            f"h = {1e3 * h:g} mm, but the response has elements of {1e3 * size:g} mm; leave out h"
+        )
+    return size

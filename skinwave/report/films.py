@@ -1,6 +1,8 @@
-"""Films of a period of motion: GIF, or MP4 where an encoder is installed."""
+"""Films of motion: GIF, or MP4 where an encoder is installed."""
 
+from base64 import b64encode
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,7 @@ import numpy as np
 from simple_model.numbers import significant
 from skinwave.report.palette import COLOURS, SPARE
 from skinwave.report.render import Image, stage
+from skinwave.report.renderer import renderer
 from skinwave.report.styles import Style
 from skinwave.results import playback
 from skinwave.results.views import View
@@ -18,18 +21,38 @@ from skinwave.system.effort import Progress, silent
 SHORTEST = 4.0  # s, of a film
 SHORTEST_FRAME = 0.04  # s
 ROUND_OFF = 1e-4  # of a turn
-FORMATS = (".gif", ".mp4")
+FORMATS = {".gif": "image/gif", ".mp4": "video/mp4"}
 ENCODER = ("imageio", "imageio_ffmpeg")
 SHADES = 240  # colours of a GIF that are chosen from its frames; the others are fixed
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Film:
+    """Film that plays in a notebook: its `frames`, its `suffix`, .gif or .mp4, and its `data`."""
+
+    frames: int
+    suffix: str
+    data: bytes
+
+    def __repr__(self) -> str:
+        return (
+            f"<Film: {self.frames} frames, {self.suffix[1:].upper()} of {len(self.data):,} bytes>"
+        )
+
+    def _repr_html_(self) -> str:
+        source = f"data:{FORMATS[self.suffix]};base64,{b64encode(self.data).decode()}"
+        if self.suffix == ".gif":
+            return f'<img alt="film of the motion" src="{source}">'
+        return f'<video controls loop autoplay muted src="{source}"></video>'
 
 
 def film(
     path: Path, views: Sequence[View], style: Style, progress: Progress | None = None, *,
     camera: str = "tilted", panel: tuple[int, int] | None = None,
 ) -> None:  # fmt: skip
-    """Write a film of one period of the steady state, with the views side by side.
+    """Write a film of all frames of views, side by side.
 
-    It repeats without a jump if the load is periodic. Raises the errors of `check_format`.
+    One period of a steady state repeats without a jump. Raises the errors of `check_format`.
     """
     check_format(path)
     count, report = len(views[0].times), progress or silent
@@ -47,7 +70,7 @@ def film(
 
 
 def check_format(path: Path) -> None:
-    """Raise a ValueError if a film of this format cannot be written."""
+    """Raise a ValueError if a film of this format cannot be drawn or written."""
     if path.suffix not in FORMATS:
         raise ValueError(f"the film '{path.name}' must end in {' or '.join(FORMATS)}")
     if path.suffix == ".mp4" and not all(map(find_spec, ENCODER)):
@@ -55,6 +78,8 @@ def check_format(path: Path) -> None:
             "MP4 needs imageio and imageio-ffmpeg, which are not installed. Install the extra "
             "[film], or write a .gif"
         )
+    if not renderer().is_available:
+        raise ValueError(f"this machine cannot draw a film: {renderer().detail}")
 
 
 def played_text(view: View) -> str:

@@ -67,7 +67,7 @@ def scale_text(view: View) -> str:
     if not factor:
         return "pressure, no motion"
     named = f"colour: {quantity(view.shade.quantity).words}; " if view.shade else ""
-    return f"{named}exaggerated {factor:,.0f} times, mean removed"
+    return f"{named}exaggerated {factor:,.0f} times{', mean removed' * (not view.from_rest)}"
 
 
 def picture(

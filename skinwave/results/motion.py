@@ -1,11 +1,11 @@
-"""Steady motion of a whole meshed body, line by line, for maps, films and exported fields.
+"""Motion of a whole meshed body for maps, films and exported fields: steady, or from rest.
 
-Linear quantities are about their mean. Invariants, such as the largest shear strain, are computed
-from the whole tensor including its mean, as at probes. For an unconstrained body the mean is left
-out, because it grows without bound.
+Steady linear quantities are about their mean. Invariants, such as the largest shear strain, are
+computed from the whole tensor including its mean, as at probes. For an unconstrained body the mean
+is left out, because it grows without bound.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from simple_model import Effort, Material, Response, Trajectory
 from simple_model.layers.tensors import hooke
 from simple_model.load.path_cells import path_samples
 from simple_model.load.spectrum import synthesise
-from simple_model.quantities import NORMAL, STRAIN, VECTOR, Quantity
+from simple_model.quantities import DISPLACEMENT, NORMAL, STRAIN, VECTOR, Quantity
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.models.laws import relaxing, series_tolerance
@@ -37,6 +37,7 @@ from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.reduced import (
     ReducedResponse,
     from_rest,
+    from_rest_at,
     in_motion,
     oscillating,
     read_at,
@@ -44,7 +45,7 @@ from skinwave.models.reduced import (
     respond,
 )
 from skinwave.scene.scene import Reading, Scene
-from skinwave.system.effort import Clock
+from skinwave.system.effort import Clock, one_thread
 from skinwave.typing import Floats, Ints
 
 REDUCTION_TOLERANCE = 0.01  # stress at the surface then meets the load within 3 %
@@ -124,6 +125,7 @@ def whole_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
     return reduced_motion(scene, options)
 
 
+@one_thread()
 def reduced_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
     """Mesh a body, reduce it to the subspace of the load along its path, and compute its lines."""
     return next(reduced_motions([scene], options))[1]
@@ -205,6 +207,31 @@ def vibration(moved: BodyMotion, times: Floats) -> Floats:
     return (z @ moved.own_basis.T).reshape(len(times), -1, 3)
 
 
+@one_thread()
+def motion_from_rest(moved: BodyMotion, times: Floats, quantity: Quantity = DISPLACEMENT) -> Floats:
+    """Return the displacement in m or, for VELOCITY, the velocity in m/s of the nodes of `mesh`
+    from rest, (t, m, 3), at any times (t,) in s.
+    """
+    check_values(len(times), len(moved.mesh.points))
+    z = from_rest_at(in_motion(moved.motion, quantity, ()), times)
+    return (z @ moved.own_basis.T).reshape(len(times), -1, 3)
+
+
+@one_thread()
+def strain_from_rest(moved: BodyMotion, times: Floats) -> Floats:
+    """Return the strain (t, m, 6), components xx, yy, zz, xy, xz, yz, of a solid body at the nodes
+    of `mesh` from rest, at any times (t,) in s; the mean of both sides at an interface.
+    """
+    u, nodes = moved.basis @ from_rest_at(moved.motion, times).T, np.arange(len(moved.nodes))
+
+    def values(solid: SolidPart, wanted: Ints) -> Floats:
+        return nodal_strain(solid, u, wanted).T
+
+    strain = _over_parts(moved, np.zeros((len(times), 6, len(nodes))), nodes, values)
+    return strain.swapaxes(1, 2)
+
+
+@one_thread()
 def tensors(moved: BodyMotion, times: Floats, frames: Ints) -> Tensors:
     """Return strain and stress of a solid body at some `frames` (t,) of its `times` (f,) in s."""
     lines, offset = oscillating(moved.motion), 0
@@ -259,19 +286,33 @@ def shade(scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints) -> Shade:
     return Shade(quantity=quantity.name, nodes=nodes, values=values.astype(np.float32))
 
 
+@one_thread()
 def _of_strain(
     quantity: Quantity, lines: ReducedResponse, moved: BodyMotion, times: Floats, nodes: Ints
 ) -> Floats:
     """Return values (t, q) of a quantity of strain, averaged over both sides of an interface."""
-    total, count = np.zeros((len(times), len(nodes))), np.zeros(len(nodes))
+
+    def values(solid: SolidPart, wanted: Ints) -> Floats:
+        z = _coordinates(lines, times, solid.material, quantity)
+        strain = nodal_strain(solid, moved.basis @ z.T, wanted)
+        components = np.einsum("vc,qct->tqv", quantity.rows(solid.material), strain, optimize=True)
+        return quantity.waveforms(components.reshape(len(times), -1), len(wanted))
+
+    return _over_parts(moved, np.zeros((len(times), len(nodes))), nodes, values)
+
+
+def _over_parts(
+    moved: BodyMotion, total: Floats, nodes: Ints, values: Callable[[SolidPart, Ints], Floats]
+) -> Floats:
+    """Add to `total` (..., q) the values (..., w) of each part at some of its nodes (w,), and
+    return the mean over the parts at nodes (q,) of `moved.mesh`.
+    """
+    count = np.zeros(len(nodes))
     for solid, own in _parts(moved):
         numbers = np.searchsorted(moved.nodes, solid.nodes[own])
         wanted = np.isin(numbers, nodes)
-        z = _coordinates(lines, times, solid.material, quantity)
-        strain = nodal_strain(solid, moved.basis @ z.T, own[wanted])
-        components = np.einsum("vc,qct->tqv", quantity.rows(solid.material), strain, optimize=True)
         at = np.searchsorted(nodes, numbers[wanted])
-        total[:, at] += quantity.waveforms(components.reshape(len(times), -1), int(wanted.sum()))
+        total[..., at] += values(solid, own[wanted])
         count[at] += 1
     return total / count
 

@@ -70,6 +70,7 @@ class View:
     tensors : strain and stress at some of the times, of a solid body read from a file
     shade : quantity that colours the surface instead of its motion
     moved : motion of the whole body; not stored in files
+    from_rest : bool, whether `motion` is from rest instead of about its mean
     """
 
     body: str
@@ -88,6 +89,7 @@ class View:
     tensors: Tensors | None = None
     shade: Shade | None = None
     moved: BodyMotion | None = None
+    from_rest: bool = False
 
     @property
     def column(self) -> str:
@@ -124,18 +126,24 @@ def body_view(
     """Return the view of a meshed body; `part` is the played duration in s and the number of
     frames, by default those of `playback.played_part`.
     """
-    mesh = moved.mesh
     period, frames = part or played_part(scene.pressure, fastest_line(moved))
-    surface, local = np.unique(mesh.facets["top"], return_inverse=True)
     times = np.arange(frames) * period / frames
+    view = motion_view(scene, body, moved, times, vibration(moved, times))
+    return replace(view, period=period, from_rest=False)
+
+
+def motion_view(scene: Scene, body: str, moved: BodyMotion, times: Floats, motion: Floats) -> View:
+    """Return the view of a meshed body with its displacement (t, m, 3) in m from rest."""
+    mesh = moved.mesh
+    surface, local = np.unique(mesh.facets["top"], return_inverse=True)
     _, inwards = node_operator(mesh, patch=scene.body.of_kind.normal_patch)
     lines = read_at(oscillating(moved.motion), inwards @ moved.own_basis)
     tone = _strongest_tone(lines.frequencies, np.abs(lines.lines))
     return View(
         body=body, model="fem", quantity=DISPLACEMENT, scene=scene, points=mesh.points,
-        tets=mesh.tets, surface=surface, triangles=split(local.reshape(-1, 6)), period=period,
-        times=times, motion=vibration(moved, times).astype(np.float32), tone=tone,
-        speed=_speed(scene, tone), moved=moved,
+        tets=mesh.tets, surface=surface, triangles=split(local.reshape(-1, 6)),
+        period=float(np.ptp(times)), times=times, motion=motion.astype(np.float32), tone=tone,
+        speed=_speed(scene, tone), moved=moved, from_rest=True,
     )  # fmt: skip
 
 

@@ -76,8 +76,8 @@ class SweepTable:
         choose("column", column, self.columns)
         return [row.get(column) for row in self.rows]
 
-    def to_pandas(self) -> pd.DataFrame:
-        """Return a data frame with a row for each run; column names end in their unit."""
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a data frame of pandas with a row for each run; column names end in their unit."""
         return library("pandas").DataFrame([dict(row) for row in self.rows])
 
     def plot(

@@ -1,17 +1,23 @@
 """Records draw and convert themselves: responses, meshes, fields, scenes, plans, sweeps."""
 
+import gc
 import re
 import sys
 from dataclasses import replace
+from importlib.util import find_spec
+from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from legible import illegible, sizes
+from PIL import Image
 
 import meshes
 import skinwave
+from fem.stress import nodal_strain, solid_parts
 from simple_model import (
     Effort,
     ErrorPart,
@@ -25,13 +31,17 @@ from simple_model import (
 from simple_model.load.focus import spot_width
 from skinwave.planning.record import PlanRow
 from skinwave.planning.simulate import compute
-from skinwave.report.fields import Field
+from skinwave.report import films
+from skinwave.report.renderer import renderer  # noqa: F401, in the condition below
 from skinwave.report.styles import style
 from skinwave.results import citations
+from skinwave.results.motion import probe_response
+from skinwave.scene.scene import Layer
 from skinwave.sweeps.in_python import SweepTable
 
 # What is tested here is not how accurate a model is.
 pytestmark = pytest.mark.filterwarnings("ignore::skinwave.SkinwaveWarning")
+draws = pytest.mark.skipif("not renderer().is_available", reason="nothing draws solids here")
 ROOT = Path(__file__).parents[2]
 RATE = 10_000.0
 MESH = ErrorPart(name="mesh", source="elements of 3 mm", error=0.03, cure="use smaller elements")
@@ -64,8 +74,27 @@ def wave(frequency=130.0, quantity="displacement", n=1000, warnings=("too <coars
     )  # fmt: skip
 
 
-def test_to_pandas_has_values_probes_and_units(monkeypatch):
-    table = wave(quantity="strain_xz").to_pandas()
+def test_to_xarray_has_units_and_is_written_to_netcdf(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ImportError, match="pip install xarray"):
+        wave().to_xarray()
+    monkeypatch.undo()
+    xarray = pytest.importorskip("xarray")
+    response = wave(quantity="strain_xz")
+    response.to_xarray().to_netcdf(tmp_path / "wave.nc", engine="scipy")
+    with xarray.open_dataarray(tmp_path / "wave.nc", engine="scipy") as read:
+        assert read.dims == ("time", "probe")
+        assert np.array_equal(read.values, response.values)
+        assert np.array_equal(read["time"], response.times)
+        assert np.array_equal(np.column_stack([read["x"], read["y"]]), PLACES)
+        assert [read[name].units for name in ("time", "x", "y")] == ["s", "m", "m"]
+        assert read.name == read.quantity == "strain_xz"
+        assert (read.units, read.long_name, read.model) == ("1", "strain xz", "made")
+        assert (read.expected_error, read.warnings) == (0.03, "too <coarse>")
+
+
+def test_to_dataframe_has_values_probes_and_units(monkeypatch):
+    table = wave(quantity="strain_xz").to_dataframe()
     assert table.index.name == "time_s"
     assert table.columns.names == ["x_m", "y_m"]
     assert (table.attrs["units"], table.attrs["expected_error"]) == ("1", 0.03)
@@ -73,7 +102,7 @@ def test_to_pandas_has_values_probes_and_units(monkeypatch):
     assert np.array_equal(table.columns.to_list(), PLACES)
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="pip install pandas"):
-        wave().to_pandas()
+        wave().to_dataframe()
     for response, name in ((wave(quantity="acceleration"), "displacement"), (wave(), "lines")):
         with pytest.raises(ValueError, match="values|unknown"):
             getattr(response, name)
@@ -121,24 +150,85 @@ def test_to_pyvista_keeps_the_mesh():
 
 
 @pytest.fixture(scope="module")
-def field():
-    """A wave that runs along x through a block."""
-    block = meshes.tag_boundary(meshes.block((8e-3, 4e-3, 2e-3), 2e-3))
-    times = np.arange(9) * 1e-3
-    phase = 2 * np.pi * (100 * times[:, None] - block.points[:, 0] / 8e-3)
-    up = 1e-6 * (1 + times[:, None]) * np.sin(phase)
-    moved = np.stack([1e-7 * np.cos(phase), 0 * phase, up], 2)
-    return Field(mesh=block, times=times, displacement=moved, effort=Effort())
+def small(scene):
+    path = Trajectory(shape="circle", size=0.008, speed=5.0)
+    tacton = replace(scene.tacton, trajectory=path, duration=0.05)
+    body = replace(scene.body, width=0.024, height=0.02, depth=0.006, sides="clamped")
+    pressure = replace(scene.pressure, tacton=tacton)
+    return replace(scene, pressure=pressure, body=body, probes=((0.0, 0.0), (0.004, 0.0)))
+
+
+@pytest.fixture(scope="module")
+def field(small):
+    return skinwave.field(small, 5e-3 + np.arange(9) * 1e-3, 0.2, h=3e-3)
 
 
 def test_a_field_at_a_time_has_its_displacement(field):
-    grid = field.to_pyvista(0.0032)
+    grid = field.to_pyvista(0.0082)
     assert np.array_equal(grid["displacement"], field.displacement[3])
-    assert grid.field_data["time_s"][0] == 0.003
+    assert grid.field_data["time_s"][0] == 0.008
     assert np.array_equal(grid.cells_dict[24], field.mesh.tets)
-    for time in (-0.001, 0.009):
+    shown = [grid.field_data["time_s"][0] for grid in field.grids([0.006, 0.013])]
+    assert shown == [field.times[1], field.times[8]]
+    for time in (0.004, 0.014):
         with pytest.raises(ValueError, match="outside"):
             field.to_pyvista(time)
+
+
+def test_a_field_has_the_motion_of_probes_and_its_rate(field, small):
+    nodes = np.unique(field.mesh.facets["top"])[::40]
+    places = tuple(map(tuple, field.mesh.points[nodes, :2].tolist()))
+    sampled = probe_response(replace(small, probes=places), field.moved)  # every 0.1 ms from 0
+    read = np.searchsorted(sampled.times, field.times - 1e-9)
+    assert -field.displacement[:, nodes, 2] == pytest.approx(sampled.values[read], abs=1e-12)
+    for time, grid in zip(field.times, field.grids(), strict=True):
+        near = replace(field, times=np.array([time - 1e-6, time + 1e-6])).displacement
+        rate, velocity = (near[1] - near[0]) / 2e-6, grid["velocity"]
+        assert np.abs(velocity - rate).max() < 1e-3 * np.abs(rate).max()
+
+
+def test_strain_of_a_field_is_the_gradient_of_its_displacement(field):
+    grid, x = field.to_pyvista(), field.mesh.points
+    inner = (np.abs(x + [0, 0, 0.003]) < [0.008, 0.006, 0.002]).all(axis=1)
+    slopes = grid.compute_derivative("displacement")["gradient"].reshape(-1, 3, 3)[inner]
+    pairs = ([0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2])  # XX, YY, ZZ, XY, YZ, XZ
+    gradient = ((slopes + slopes.swapaxes(1, 2)) / 2)[:, *pairs]
+    for own, other in zip(grid["strain"][inner].T, gradient.T, strict=True):  # of one element each
+        assert np.linalg.norm(own - other) < 0.2 * np.linalg.norm(own)
+    # Displacements A x, times the first coordinate of the motion.
+    A = np.arange(9.0).reshape(3, 3) ** 2
+    affine = np.zeros_like(field.moved.basis)
+    affine[:, 0] = (x @ A.T).ravel()
+    grid = replace(field, moved=replace(field.moved, basis=affine)).to_pyvista()
+    amount = grid["displacement"][0] @ x[0] / (x[0] @ A.T @ x[0])
+    expected = amount * ((A + A.T) / 2)[pairs]
+    assert grid["strain"] == pytest.approx(np.tile(expected, (len(x), 1)), rel=1e-6)
+
+
+def test_strain_at_an_interface_is_the_mean_and_a_sheet_has_none(small):
+    layers = (Layer(thickness=3e-3, material="palm-stiff"),)
+    layered = replace(small, body=replace(small.body, layers=layers))
+    field = skinwave.field(layered, [0.01], 0.5, h=4e-3)
+    each = np.full((2, len(field.mesh.points), 6), np.nan)
+    for k, part in enumerate(solid_parts(field.mesh, field.moved.build.material)):
+        each[k, part.nodes] = nodal_strain(part, field.displacement.reshape(1, -1).T)[..., 0]
+    jump = np.linalg.norm(each[1] - each[0], axis=1)
+    assert np.nanmax(jump) > 0.1 * np.nanmax(np.abs(each))
+    expected = np.nanmean(each, axis=0)[:, [0, 1, 2, 3, 5, 4]]
+    assert field.to_pyvista()["strain"] == pytest.approx(expected, rel=1e-6, abs=1e-12)
+    sheet = replace(small, body=replace(skinwave.BODIES["paper-sheet"], width=0.03, height=0.03))
+    grid = skinwave.field(sheet, [0.01], 0.5, h=7e-3).to_pyvista()
+    assert set(grid.point_data) == {"displacement", "velocity", "pressure"}
+
+
+def test_pressure_of_a_field_is_the_moving_pressure(field, small):
+    top = np.zeros(len(field.mesh.points), bool)
+    top[field.mesh.facets["top"]] = True
+    for time, grid in zip(field.times, field.grids(), strict=True):
+        expected = small.pressure(field.mesh.points[top, :2], time)
+        assert grid["pressure"][top] == pytest.approx(expected)
+        assert not grid["pressure"][~top].any()
+    assert expected.max() > 10
 
 
 def test_paraview_reads_what_a_field_saves(field, tmp_path):
@@ -147,16 +237,76 @@ def test_paraview_reads_what_a_field_saves(field, tmp_path):
     path = field.save(tmp_path / "wave.pvd")
     reader = pv.get_reader(path)
     assert reader.time_values == pytest.approx(field.times)
-    reader.set_active_time_value(reader.time_values[5])
-    assert np.array_equal(reader.read()[0]["displacement"], field.displacement[5])
+    for k, grid in enumerate(field.grids()):
+        reader.set_active_time_value(reader.time_values[k])
+        (read,) = reader.read()
+        for name in ("displacement", "velocity", "strain", "pressure"):
+            assert np.array_equal(read[name], grid[name]), name
+        assert np.array_equal(read.points, grid.points)
+    assert "velocity: m/s" in list(read.field_data["units"])
     for name in ("wave.pvd", "wave.vtk"):  # one that exists, and one of another format
         with pytest.raises(ValueError, match="wave"):
             field.save(tmp_path / name, frames=2)
     assert len(pv.get_reader(field.save(path, frames=2, overwrite=True)).time_values) == 2
 
 
+@draws
+def test_a_film_of_a_field_plays_in_a_notebook(field, tmp_path):
+    shown = field.animate(frames=4)
+    assert "data:image/gif;base64,R0lG" in shown._repr_html_()
+    with Image.open(BytesIO(shown.data)) as gif:
+        frames = [gif.seek(k) or np.asarray(gif.convert("RGB")) for k in range(gif.n_frames)]
+    assert len(frames) == shown.frames == 4
+    assert all(np.abs(a - 1.0 * b).max() > 50 for a, b in pairwise(frames))
+    path = tmp_path / "wave.gif"
+    assert field.animate(path, 4).data == path.read_bytes() == shown.data
+    for call in ({"path": path}, {"path": tmp_path / "wave.avi"}, {"camera": "lop"}):
+        with pytest.raises(ValueError, match=r"exists|must end in|tilted"):
+            field.animate(**call)
+
+
+@draws
+@pytest.mark.skipif(not all(map(find_spec, films.ENCODER)), reason="the extra [film] is missing")
+@pytest.mark.filterwarnings(  # imageio-ffmpeg leaves its encoder's pipe to the collector
+    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
+def test_a_film_of_a_field_may_be_an_mp4(field, tmp_path):
+    import imageio.v2 as imageio
+
+    shown = field.animate(tmp_path / "wave.mp4", 3)
+    with imageio.get_reader(tmp_path / "wave.mp4") as film:
+        assert sum(1 for _ in film) == 3
+    assert "data:video/mp4;base64," in shown._repr_html_()
+    gc.collect()
+
+
+def test_a_field_takes_size_and_error_of_a_response(field, small, monkeypatch):
+    response = skinwave.simulate(small, "fem", 0.2, h=3e-3)
+    monkeypatch.setattr("skinwave.report.fields.assess", None)  # solves another mesh
+    found = skinwave.field(small, field.times, 0.2, response=response)
+    assert np.array_equal(found.displacement, field.displacement)
+    parts = {part.name: part.error for part in response.effort.errors.parts}
+    assert {part.name for part in found.effort.errors.parts} == set(parts)
+    assert parts["mesh"] == {p.name: p.error for p in found.effort.errors.parts}["mesh"]
+    louder = replace(small, pressure=replace(small.pressure, peak_pressure=70.0))
+    kernel = skinwave.simulate(small, "point-kernel", 0.9)
+    for scene, given, h in (
+        (louder, response, None), (small, kernel, None), (small, response, 2e-3),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=r"another load|linear elements|leave out h"):
+            skinwave.field(scene, field.times, response=given, h=h)
+
+
+@pytest.mark.parametrize("times", [[], [0.0, np.nan], [0.01, 0.0], [-0.01, 0.0], [0.0, 0.06]])
+def test_times_of_a_field_ascend_within_the_tacton(field, small, times):
+    with pytest.raises(ValueError, match="times"):
+        replace(field, times=times)
+    with pytest.raises(ValueError, match="times"):
+        skinwave.field(small, times, 0.5, h=6e-3)
+
+
 def test_plot_of_a_field_shows_the_upper_surface(field):
-    ax = field.plot(0.002)
+    ax = field.plot(0.007)
     image = ax.collections[0]
     top = np.unique(field.mesh.facets["top"])
     assert np.asarray(image.get_array()) == pytest.approx(-1e6 * field.displacement[2, top, 2])
@@ -218,7 +368,7 @@ def test_a_sweep_in_python_has_the_runs_of_each_scene(scene, tmp_path):
         load = replace(short, tacton=replace(base.tacton, trajectory=path), peak_pressure=20.0)
         found = compute(replace(base, pressure=load), "flat-body-harmonic")
         assert row["peak_um"] == pytest.approx(1e6 * np.abs(found.values).max(axis=0), rel=1e-6)
-    assert table.to_pandas()["tacton.speed_m_per_s"].tolist() == table["tacton.speed_m_per_s"]
+    assert table.to_dataframe()["tacton.speed_m_per_s"].tolist() == table["tacton.speed_m_per_s"]
     again = skinwave.sweep(base, vary, model="flat-body-harmonic", folder=tmp_path / "kept")
     assert again["seconds"] == table["seconds"]  # which were not run again
     assert table.plot("peak_um[1]").lines
