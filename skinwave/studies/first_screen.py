@@ -6,13 +6,14 @@ from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING
 
+from skinwave.models import named
 from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.planning.budget import ErrorBudget, error_budget
 from skinwave.planning.simulate import compute
-from skinwave.results.propagation import Propagation, propagation, share_outside
+from skinwave.results.propagation import Propagation, added_lines, propagation, share_outside
 from skinwave.results.run import Run
 from skinwave.results.surface import (
     SurfaceField,
@@ -41,7 +42,8 @@ class FirstScreen:
     """Results on the first screen of a page: of one Tacton the runs of the kernel under the same
     load and as published, and of bodies, and maps and views by column; effects of propagation by
     Tacton and column. If known: smallest and largest share outside over the range of materials,
-    error budget of `body`, and measured places.
+    error budget of `body`, and measured places. `added` are the lines that a sheet which stretches
+    adds to those of its load in any Tacton, by column.
     """
 
     kernel: Run
@@ -50,6 +52,7 @@ class FirstScreen:
     effects: Mapping[str, Mapping[str, Propagation]]
     maps: Mapping[str, SurfaceField] = field(default_factory=dict)
     views: Sequence[View] = ()
+    added: Mapping[str, Sequence[str]] = field(default_factory=dict)
     shares: tuple[float, float] | None = None
     budget: ErrorBudget | None = None
     measured: "MeasuredPlaces | None" = None
@@ -94,12 +97,24 @@ def first_screen(
             maps |= {kernel.column: own[1], run.column: own[0]}
     first = FirstScreen(
         kernel=kernel, published=published, bodies=bodies, effects=effects_of(groups, maps_of),
-        maps=maps, views=views,
+        maps=maps, views=views, added=_added(groups),
     )  # fmt: skip
     if first.own[first.body.column].strongest is None:
         return first
     scene, error = first.body.scene, first.body.response.expected_error
     return replace(first, shares=_shares(scene), budget=error_budget(scene, error))
+
+
+def _added(groups: Mapping[str, Sequence[Run]]) -> dict[str, list[str]]:
+    """Return the lines that nonlinear bodies add to those of their load, by column."""
+    added: dict[str, list[str]] = {}
+    for group in groups.values():
+        kernel = _run_of(group, SAME_LOAD.name)
+        for run in group if kernel else ():
+            if kernel and run.is_motion and named(run.model).is_nonlinear:
+                lines = added.setdefault(run.column, [])
+                lines += [name for name in added_lines(run, kernel) if name not in lines]
+    return added
 
 
 def with_kernels(run: Run) -> list[Run]:

@@ -298,7 +298,7 @@ def _free_vibration(runs: Iterable[Run]) -> str:
 
 def sentences(first: FirstScreen) -> list[str]:
     """Return the verdict: what propagation changes, and what drive law and focus change."""
-    return [_propagation_sentence(first), _drive_sentence(first.kernel, first.published)]
+    return [_propagation_sentence(first), _drive_sentence(first)]
 
 
 def four_numbers(first: FirstScreen) -> Table:
@@ -358,15 +358,22 @@ def _propagation_sentence(first: FirstScreen) -> str:
     )
 
 
-def _drive_sentence(kernel: Run, published: Run) -> str:
-    names, pressure = added_lines(kernel, published), kernel.scene.pressure
+def _drive_sentence(first: FirstScreen) -> str:
+    kernel, published, pressure = first.kernel, first.published, first.kernel.scene.pressure
     if pressure == published.scene.pressure:
         return "The load is the published one; only propagation differs from the paper's model."
     law = f"drive law and focus ({pressure.drive}, {pressure.profile_name})".replace("_", " ")
-    if not names:
-        return f"{law.capitalize()} change amplitudes of lines and add none."
-    added = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
-    return f"{law.capitalize()} make the lines {added}. Linear propagation adds none."
+    text = f"{law.capitalize()} change amplitudes of lines and add none."
+    if names := added_lines(kernel, published):
+        text = f"{law.capitalize()} make the lines {_first_names(names)}."
+    if not first.added:
+        return f"{text} Linear propagation adds none." if names else text
+    each = (f"{_first_names(own) or 'none'} to the {label(c)}" for c, own in first.added.items())
+    return f"{text} Stretching adds {', '.join(each)}; linear waves add none."
+
+
+def _first_names(names: Sequence[str]) -> str:
+    return ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
 
 
 def _uncertainty(first: FirstScreen) -> str:

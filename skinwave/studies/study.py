@@ -147,9 +147,10 @@ def run_study(
         first = None
         if not interrupted:
             first = first_screen(
-                groups, lambda run: surfaces.get((run.tacton, run.column), Surface()).maps,
+                groups,
+                partial(_maps, surfaces, failed),
                 _views(scenes[first_name(scenes)], surfaces),
-            )  # fmt: skip
+            )
     parts: list[document.Part] = [*more]
     figures: dict[str, Sequence[Run]] = dict(groups)
     conclusions: list[str] = []
@@ -336,6 +337,15 @@ def _collect(
 ) -> None:
     surfaces.update(found[0])
     failures.update(found[1])
+
+
+def _maps(surfaces: Mapping[tuple[str, str], Surface], failures: dict[str, str], run: Run) -> Maps:
+    """Return the maps of a body and of the kernel, or none if they fail or are not known."""
+    if found := surfaces.get((run.tacton, run.column)):
+        return found.maps
+    with or_failed(failures, f"map of {run.column}"):
+        return quick_maps(run)  # of a body that needs no mesh, but was computed by elements
+    return ()
 
 
 def _views(scenes: Mapping[str, Scene], surfaces: Mapping[tuple[str, str], Surface]) -> list[View]:

@@ -215,7 +215,7 @@ def test_the_first_screen_has_a_verdict_and_four_numbers():
     scene = Scene(pressure=MovingPressure(tacton=BOTH), body=Body())
     first = first_screen({"one": with_kernels(_run(scene, "flat-body-harmonic"))}, quick_maps)
     waves, drive = sentences(first)
-    found = first.effects["skin-slab"]
+    found = first.own["skin-slab"]
     assert f"{100 * found.share:.0f} %" in waves
     assert "f_d" in drive
     level, reach, share, delay = ([str(row[0]), *row[1:]] for row in four_numbers(first).rows)
