@@ -65,6 +65,7 @@ KARMAN = (
 LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
 COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number compared with the one before
 FIRST_DURATION = 0.2  # s of a response, at least, for which steps and modes are chosen
+NEGLIGIBLE_MODE = 1e-4  # of the mode that moves most: weaker modes do not show on a map
 SHARE = 0.3  # of the tolerance, for the change by longer steps and fewer modes
 # Error over this change: 0.2 to 1.7, because modes converge slowly near a resonance.
 TRUNCATION = 2.0
@@ -346,21 +347,22 @@ def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
 
 
 @lru_cache(maxsize=1)
-def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
+def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Callable[..., Floats]]:
     """Return the motion of a whole sheet from rest: times (t,) in s, coordinates (t, m) in kg^1/2 m
-    of all modes, and the modes.
+    of all modes that move, and the function of their shapes (p, m) at places (p, 2) in m.
     """
-    times = sample_times(scene)
+    times, middle = sample_times(scene), scene.body.placement.offset
     options = SolveOptions(tolerance=tolerance)
     modes: PlateModes = modes_of(plate_of(scene.body))
     found = _stretch(scene, times, options, modes, FROM_REST.solve(scene, times, options).values)
-    middle = scene.body.placement.offset
-    z = linear_motion(modes, scene.pressure, scene.body.solid, times, middle=middle)
     plate, stretching = _coordinates(
         scene.pressure, scene.body, len(times), step(times), found.count, found.parts
     )
-    z[:, plate.chosen] += stretching[:: found.parts]
-    return times, z, modes
+    sizes = np.linalg.norm(_drive(scene, times).motion, axis=0)
+    moving = np.union1d(np.flatnonzero(sizes > NEGLIGIBLE_MODE * sizes.max()), plate.chosen)
+    z = linear_motion(modes, scene.pressure, scene.body.solid, times, middle=middle, chosen=moving)
+    z[:, np.searchsorted(moving, plate.chosen)] += stretching[:: found.parts]
+    return times, z, lambda places: modes.at(places - middle)[:, moving]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -181,7 +181,7 @@ def stretching_lines(scene: Scene, tolerance: float) -> tuple[LinesAt, str]:
 
     Without a steady vibration within the Tacton, they are those of its whole motion from rest.
     """
-    times, z, modes = sheet_motion(scene, tolerance)
+    times, z, shapes = sheet_motion(scene, tolerance)
     coordinates = Response(model="", times=times, probes=np.zeros((z.shape[1], 2)), values=z)
     found, note = fitted_lines(coordinates, scene.pressure), "stretching plate"
     if found is None:
@@ -191,7 +191,7 @@ def stretching_lines(scene: Scene, tolerance: float) -> tuple[LinesAt, str]:
         found = (1 + np.flatnonzero(shown)) / (len(z) * times[1]), a[shown]
         note += " from rest, with free vibration"
     f, amplitudes = found
-    return lambda places: (f, amplitudes @ modes.at(places - scene.body.placement.offset).T), note
+    return lambda places: (f, amplitudes @ shapes(places).T), note
 
 
 def quantity_map(

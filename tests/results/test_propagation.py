@@ -3,7 +3,6 @@
 from dataclasses import replace
 from math import inf, pi
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -134,9 +133,9 @@ def test_maps_of_a_stretching_sheet_leave_out_free_vibration(monkeypatch):
     load, (x, y) = MovingPressure(tacton=BOTH), (np.linspace(-1e-3, 1e-3, n) for n in (3, 2))
     pulsed = replace(load, tacton=replace(BOTH, rhythm=Rhythm(pulses=((0.1, 0.1),))))
     sheet = Scene(pressure=load, body=BODIES["paper-sheet"], probes=((0.0, 0.0),))
-    modes = SimpleNamespace(at=lambda places: np.tile([1.0, 2.0], (len(places), 1)))
+    shapes = lambda places: np.tile([1.0, 2.0], (len(places), 1))  # noqa: E731
     found = ringing(load, 0.5)
-    motion = lambda scene, tolerance: (found.times, found.values, modes)  # noqa: E731
+    motion = lambda scene, tolerance: (found.times, found.values, shapes)  # noqa: E731
     monkeypatch.setattr(surface, "sheet_motion", motion)
     monkeypatch.setattr(surface, "stretches", lambda *_: True)
     drawn = body_map(sheet, x, y)
