@@ -183,6 +183,13 @@ def model_from_rest(scene: Scene, options: SolveOptions = DEFAULT) -> tuple[Mode
         if scene.body.sides == "absorbing":
             return FLAT_BODY, "flat layers with absorbing sides, which need no mesh"
         return FLAT_BODY, f"reflections from the sides are only {percent(reflections)}"
+    return model_with_sides(scene, tolerance)
+
+
+def model_with_sides(scene: Scene, tolerance: float = DEFAULT.tolerance) -> tuple[Model, str]:
+    """Return the cheapest linear model from rest that includes any reflecting sides, and the reason
+    for it. Raises a ValueError if no model takes the scene.
+    """
     if reason := why_modes(scene, tolerance):
         return FROM_REST, reason
     model = named(default_model(scene))

@@ -3,10 +3,15 @@
 The paper's model (Lim, Seifi and Park, CHI EA '24, section 2) is a round focal spot without side
 lobes. Its pressure follows the command and acts only where it is applied, on flat skin in which
 nothing propagates. Each name in `ASSUMPTIONS` drops one of these.
+
+One chain serves all bodies. Waves first propagate in an infinite flat body with the depth, base and
+regions under the focus. Its loss is dropped there, because elements of a body with little loss
+need several times as many moments as a reduction allows.
 """
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,9 +20,15 @@ from meshes import Palm
 from simple_model import Material, MovingPressure, PronyTerm, Trajectory
 from simple_model.layers.material import PRESETS
 from simple_model.load.drive import PUBLISHED, usual_drive
+from skinwave.bodies.flattened import flattened
+from skinwave.bodies.sizes import default_size
+from skinwave.models import point_kernel
+from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.limits import takes
-from skinwave.models.plate_modes import FROM_REST, STRETCHED
+from skinwave.models.linear_elements import FINITE
+from skinwave.models.plate_modes import STRETCHED
 from skinwave.planning.estimates import response_spectrum
+from skinwave.planning.plan import model_with_sides
 from skinwave.scene.scene import BODIES, FLAT, Body, Layer, Scene, solid_of
 
 ASSUMPTIONS = {
@@ -27,19 +38,17 @@ ASSUMPTIONS = {
     "little loss": "the material has its full damping",
     "viscous loss": "the damping is that of a standard linear solid, which equals the viscous one "
     "at the strongest line only",
-    "laterally-infinite": "the body has its own size and side conditions",
+    "laterally-infinite": "the body has its own shape, size and supports",
+    "one material": "the body has layers",
     "alike in all directions": "stiffness and tension of the sheet differ by direction",
     "vacuum": "the air moves with the sheet",
     "main lobe only": "the focus has the side lobes of the array",
     "continuous path": "the focus jumps at the device's rate",
-    "one material": "skin has layers",
+    "rigid base": "the body rests on springs",
     "flat": "the palm is curved, and one layer has the mean stiffness of all layers",
     "small deflection": "the sheet stretches as it bends",
 }
-ELEMENTS = {
-    "laterally-infinite", "alike in all directions", "continuous path", "one material", "flat",
-    "small deflection",
-}  # fmt: skip
+LARGER = 1.25  # element size over the default one, at a third of the time
 DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
 LITTLE_LOSS = 0.1  # of the material's own loss: an undamped resonance has no bound
 RELAXATION_TIME = PRESETS["palm-zener"].prony[0].time
@@ -61,16 +70,18 @@ def droppable(scene: Scene) -> tuple[str, ...]:
         raise ValueError(
             "no assumption can be dropped without a body. Give the scene one under [body]"
         )
-    sheet, slab, solid = body.of_kind.is_plate, body.of_kind.is_layer, body.solid
+    sheet, slab = body.of_kind.is_plate, body.of_kind.is_layer
     conditions = {
-        "little loss": slab and solid.has_loss,
-        "viscous loss": slab and solid.fast_modulus > 0,
+        "little loss": any(solid.has_loss for solid in body.solids),
+        "viscous loss": any(solid.fast_modulus > 0 for solid in body.solids),
+        "laterally-infinite": body.sides != "absorbing" if sheet else not _is_infinite(scene),
+        "one material": bool(body.layers)
+        or (slab and sum(x.thickness for x in LAYERS) < body.depth < np.inf),
         "alike in all directions": sheet and isotropic_sheet(body) != body,
-        "vacuum": sheet and body.mounting.is_frame,
+        "vacuum": sheet and (body.air or body.mounting.is_frame),
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
-        "one material": slab
-        and (bool(body.layers) or sum(x.thickness for x in LAYERS) < body.depth),
+        "rigid base": body.base == "elastic",
         # A thin body has no room for the mounds of the palm.
         "flat": slab and body.placement == FLAT and Palm.thenar_height < body.depth < np.inf,
         "small deflection": sheet and takes(STRETCHED, scene),
@@ -78,34 +89,53 @@ def droppable(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in ASSUMPTIONS if conditions.get(name, True))
 
 
+def _is_infinite(scene: Scene) -> bool:
+    """Whether a solid is flat without reflecting sides, as it is before its own shape is used."""
+    body = scene.body
+    flat = body.of_kind.is_layer and body.placement == FLAT
+    return flat and (body.sides == "absorbing" or body.depth == np.inf)
+
+
 def side_step(scene: Scene) -> tuple[str, ...]:
     """Return the assumptions dropped in a side step with a second damping law, or ().
 
     With this law fast waves lose little energy, and finite elements take many times as long. Only
-    the wavenumber integral is therefore computed with it, unless it is the law of the scene.
+    the infinite flat body is therefore computed with it, unless it is the law of the scene.
     """
     names = droppable(scene)
-    if "viscous loss" in names or not scene.body.of_kind.is_layer or not scene.body.solid.viscosity:
+    if "viscous loss" in names or not scene.body.is_solid or not scene.body.solid.viscosity:
         return ()
     return (*names[: names.index("little loss") + 1], "viscous loss")
 
 
-def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
+def can_be_alone(name: str, names: Collection[str], scene: Scene, h: float | None = None) -> bool:
     """Whether an assumption can be the only one that is made.
 
-    The profile cannot if side lobes are among the steps, because the array's field has one profile.
-    An infinite body of elements has absorbing sides, which must differ from those of the scene, and
-    needs a constraint elsewhere.
+    The profile cannot if side lobes are among the steps, because the array has a profile of its
+    own. Little loss can in a sheet or a slab on bone; reductions of other bodies have too few
+    moments for it. An infinite body of elements needs a constraint other than its sides.
     """
+    body = scene.body
+    on_bone = body.of_kind.is_layer and body.base == "clamped" and body.depth < np.inf
     if name == "sinc^2 profile":
         return "main lobe only" not in names
+    if name == "little loss":
+        return body.of_kind.is_plate or (on_bone and "flat" not in names)
     if name != "laterally-infinite":
         return True
-    body = scene.body
-    if not body.of_kind.is_layer or "flat" in names:
-        return False
-    infinite = replace(body, sides="absorbing")
-    return infinite != body and infinite.is_held
+    return body.is_solid and "flat" not in names and infinite(scene, body, h).is_held
+
+
+def element_size(scene: Scene, h: float | None = None) -> float:
+    """Return the element size in m of all steps with elements."""
+    return h or LARGER * default_size(scene.body)
+
+
+def infinite(scene: Scene, body: Body, h: float | None = None) -> Body:
+    """Return the infinite flat body with the strata of another body under the scene's focus."""
+    path = scene.tacton.trajectory
+    places = np.vstack([path.position(np.zeros(1)), path.outline, scene.probe_points])
+    return flattened(body, places, element_size(scene, h))
 
 
 def without(
@@ -114,11 +144,13 @@ def without(
     *,
     update_rate: float = DEVICE_RATES[0],
     points: int | None = None,
+    h: float | None = None,
 ) -> tuple[Scene, str]:
-    """Return a scene without the dropped assumptions, and the model that computes it.
+    """Return a scene without the dropped assumptions, and the model that a plan takes for it: one
+    without reflections from the sides for an infinite body, one with them for any other.
 
-    `update_rate` and `points` are those of `device_path`. Assumptions on the load are the same with
-    and without propagation.
+    `update_rate` and `points` are those of `device_path`, h in m is that of `element_size`.
+    Assumptions on the load are the same with and without propagation.
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
     own = usual_drive(scene.pressure.drive, MovingPressure.drive)
@@ -129,20 +161,14 @@ def without(
         path = device_path(scene.tacton.trajectory, update_rate, points)
         pressure = replace(pressure, tacton=replace(scene.tacton, trajectory=path))
     if "no propagation" not in dropped:
-        kernel = "point-kernel" if dropped else "point-kernel-published"
-        return replace(scene, pressure=pressure, body=BODIES["none"]), kernel
-    body = _body(scene, dropped)
-    # Wavenumber integrals need a Gaussian on a homogeneous, flat and infinite body.
-    elements = pressure.profile != "gaussian" or not ELEMENTS.isdisjoint(dropped)
-    model = "fem" if elements else "flat-body"
-    if elements and body.of_kind.is_layer and "laterally-infinite" not in dropped:
-        body = replace(body, sides="absorbing")
-    changed = replace(scene, pressure=pressure, body=body)
+        kernel = point_kernel.SAME_LOAD if dropped else point_kernel.PUBLISHED
+        return replace(scene, pressure=pressure, body=BODIES["none"]), kernel.name
+    changed = replace(scene, pressure=pressure, body=_body(scene, dropped, h))
     if "small deflection" in dropped:
-        model = STRETCHED.name
-    elif elements and takes(FROM_REST, changed):
-        model = FROM_REST.name
-    return changed, model
+        return changed, STRETCHED.name
+    if "laterally-infinite" not in dropped and takes(FLAT_BODY, changed):
+        return changed, FLAT_BODY.name
+    return changed, model_with_sides(changed)[0].name
 
 
 def device_path(
@@ -179,41 +205,43 @@ def check_rate(update_rate: float) -> None:
         )
 
 
-def _body(scene: Scene, dropped: Collection[str]) -> Body:
-    body = scene.body
+def _body(scene: Scene, dropped: Collection[str], h: float | None) -> Body:
+    body, w = scene.body, 2 * np.pi * strongest_line(scene, h)
+    if body.depth == np.inf:  # elements need the part of a half-space around the focus
+        depth = body.interfaces[-2] + FINITE
+        body = replace(body, depth=depth, base="absorbing", sides="absorbing")
     if body.of_kind.is_plate and "alike in all directions" not in dropped:
         body = isotropic_sheet(body)
-    solid, line = body.solid, strongest_line(scene)
+    layers = body.layers or LAYERS * body.of_kind.is_layer
+    body = replace(body, layers=layers if "one material" in dropped else ())
+    if body.base == "elastic" and "rigid base" not in dropped:
+        body = replace(body, base="clamped", base_stiffness=0.0)
+    if "laterally-infinite" not in dropped:
+        body = infinite(scene, body, h)
     law = as_relaxing if "viscous loss" in dropped else as_viscous
 
-    def assumed(solid: Material) -> Material:
-        solid = law(solid, 2 * np.pi * line)
-        return solid if "little loss" in dropped else with_little_loss(solid, 2 * np.pi * line)
+    def assumed(material: str | Material) -> str | Material:
+        own = solid_of(material)
+        solid = law(own, w)
+        solid = solid if "little loss" in dropped else with_little_loss(solid, w)
+        return material if solid == own else solid
 
-    if body.of_kind.is_layer:
-        solid = assumed(solid)
-    changes: dict[str, object] = {
-        "material": solid if solid != body.solid else body.material,
-        "air": "vacuum" in dropped,
-    }
-    if "one material" in dropped:
-        layers = tuple(
-            replace(layer, material=assumed(solid_of(layer.material)))
-            for layer in body.layers or LAYERS
-        )
-        changes["layers"] = (merged_layer(layers),) if "flat" in dropped else layers
-    elif body.of_kind.is_layer:
-        changes["layers"] = ()
+    layers = tuple(replace(layer, material=assumed(layer.material)) for layer in body.layers)
+    changes: dict[str, object] = {"material": assumed(body.material), "layers": layers}
+    changes["regions"] = tuple((name, assumed(material)) for name, material in body.regions)
+    if body.of_kind.is_plate:
+        changes["air"] = "vacuum" in dropped
     if "flat" in dropped:
         width = min(body.width, BODIES["palm"].width)
-        changes |= {"kind": "palm", "width": width}
+        merged = (merged_layer(layers),) if layers else ()
+        changes |= {"kind": "palm", "width": width, "layers": merged}
     return replace(body, **changes)  # type: ignore[arg-type]
 
 
 def isotropic_sheet(body: Body) -> Body:
-    """Return a flat sheet with stiffness and tension averaged over its directions."""
-    mounting, tension = body.mounting, body.mounting.mean_tension
-    mean = replace(mounting, tension_x=tension, tension_y=tension, curl_x=0.0, curl_y=0.0)
+    """Return a sheet with stiffness and tension averaged over its directions."""
+    tension = body.mounting.mean_tension
+    mean = replace(body.mounting, tension_x=tension, tension_y=tension)
     if body.solid.orthotropy is None:
         return replace(body, mounting=mean)
     return replace(body, mounting=mean, material=replace(body.solid, orthotropy=None))
@@ -273,9 +301,12 @@ def as_relaxing(solid: Material, w: float) -> Material:
 
 
 def as_viscous(solid: Material, w: float) -> Material:
-    """Return the Kelvin-Voigt solid with the complex modulus of a Maxwell solid at w in rad/s."""
+    """Return the Kelvin-Voigt solid with the complex modulus of a relaxing solid at w in rad/s."""
     if not w or not solid.fast_modulus:
         return solid
+    if solid.law is not None:
+        modulus = complex(solid.complex_modulus(w))
+        return replace(solid, law=None, shear_modulus=modulus.real, viscosity=modulus.imag / w)
     relaxing = complex(solid.relaxing_modulus(w))
     lasting = replace(solid, prony=()).without_loss_factor()
     return replace(
@@ -284,9 +315,14 @@ def as_viscous(solid: Material, w: float) -> Material:
     )  # fmt: skip
 
 
-def strongest_line(scene: Scene) -> float:
-    """Return the line in Hz that moves the probes most, or 0; damping laws agree there."""
-    frequencies, shares = response_spectrum(scene, 0.05)
+@lru_cache(maxsize=8)
+def strongest_line(scene: Scene, h: float | None = None) -> float:
+    """Return the line in Hz that moves the probes of the infinite flat body most, or 0.
+
+    Damping laws agree there. h is that of `element_size`.
+    """
+    flat = replace(scene, body=infinite(scene, scene.body, h))
+    frequencies, shares = response_spectrum(flat, 0.05)
     moving = frequencies > 0
     if not moving.any():
         return 0.0

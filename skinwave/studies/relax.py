@@ -25,14 +25,15 @@ from simple_model.line_table import lines_in_pulses
 from simple_model.load.drive import usual_drive
 from simple_model.numbers import decibel, share_of, significant
 from simple_model.point_kernel import published_load
-from skinwave.bodies.sizes import default_size
 from skinwave.models import named
+from skinwave.models.limits import takes
 from skinwave.models.point_kernel import PUBLISHED
 from skinwave.planning.assessment import all_warnings
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import png
 from skinwave.report.palette import BLUE
 from skinwave.results.comparison import compare
+from skinwave.results.propagation import Reach
 from skinwave.results.run import ASSESSED
 from skinwave.scene.scene import Body, Scene, check_motion
 from skinwave.studies.assumptions import (
@@ -42,9 +43,11 @@ from skinwave.studies.assumptions import (
     check_rate,
     device_path,
     droppable,
+    element_size,
     side_step,
     without,
 )
+from skinwave.studies.outward import Outward, outward
 from skinwave.system.document import Details, Part, Picture, Report, warnings_banner
 from skinwave.system.effort import Progress, peak_memory
 from skinwave.system.failures import REASONS, failure_text, reason
@@ -56,7 +59,6 @@ HIGHEST = 600.0  # Hz, of the lines that are compared
 WEAKEST_RATIO = 0.01  # to the strongest line at a probe
 TINY = np.finfo(float).tiny
 FIRST = "as published"  # step of the model point-kernel-published
-LARGER = 1.25  # element size over the default one, at a third of the time
 # With a tenth of the damping a reduction may need more moments than allowed. Larger elements need
 # as many, which shows this at a tenth of the cost.
 ALMOST_UNDAMPED, COARSER = "all but: little loss", 3.0
@@ -65,7 +67,8 @@ LINE_COLUMNS = (
     "from_richest_db",
 )  # fmt: skip
 EFFECT_COLUMNS = (
-    "assumption", "waveform_percent", "at_mm", "level_db", "alone_percent", "costs_s", "lines_db",
+    "assumption", "waveform_percent", "at_mm", "level_db", "reach_with_mm", "reach_without_mm",
+    "alone_percent", "costs_s", "lines_db",
 )  # fmt: skip
 STEP_COLUMNS = (
     "step", "model", Column("dofs", "degrees of freedom"),
@@ -77,12 +80,13 @@ INTRODUCTION = (
     "after another. A pressure and a displacement are compared after the best-fitting factor."
 )
 BARS = (
-    "Change of the waveform by dropping each assumption, over the motion of the strongest probe; "
-    "with the change of the sensation level (SL) on skin."
+    "What changes if each assumption is dropped: the waveform, relative to the motion of the "
+    "strongest probe; and, on skin, the highest sensation level at a probe, and the distance from "
+    "the path up to which a line exceeds the detection threshold."
 )
 PAGE_COLUMNS = (
     "dropped assumption", Column("change of the waveform", digits=2), "at, mm",
-    Column("change of the sensation level", unit="dB", digits=2),
+    Column("change of the sensation level", unit="dB", digits=2), "reach above threshold, mm",
     Column("change if no other assumption is made", digits=2), "largest change of a line",
     Column("extra time", unit="s", digits=2),
 )  # fmt: skip
@@ -92,13 +96,19 @@ NEGLIGIBLE_TIME = 0.05  # s
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HierarchyStep:
-    """Step of the model hierarchy: dropped assumptions, model, body, and response or `error`."""
+    """Step of the model hierarchy: dropped assumptions, model, body, and response or `error`.
+
+    On skin, `level` is the highest sensation level in dB at a probe, and `reach` the distance from
+    the path up to which it is above 0 on the line of `outward`, or None.
+    """
 
     name: str
     dropped: tuple[str, ...]
     model: str
     body: Body | None = None
     response: Response | None = None
+    level: float | None = None
+    reach: Reach | None = None
     seconds: float = 0.0
     memory: int = 0
     error: str = ""
@@ -107,8 +117,9 @@ class HierarchyStep:
 @dataclass(frozen=True, kw_only=True)
 class Effect:
     """Effect of dropping one assumption: largest change of a waveform relative to the strongest
-    probe, its probe (x, y) in m, increase of sensation level and lines in dB, change of the
-    waveform if only this assumption is made, and additional seconds.
+    probe, its probe (x, y) in m, increase of sensation level and lines in dB, reach above
+    threshold with and without the assumption, change of the waveform if only this assumption is
+    made, and additional seconds.
     """
 
     name: str
@@ -116,6 +127,7 @@ class Effect:
     where: tuple[float, float]
     level: float | None
     decibel: dict[str, float]
+    reach: tuple[Reach | None, Reach | None]
     alone: float | None
     seconds: float
 
@@ -130,6 +142,7 @@ class Hierarchy:
     steps: tuple[HierarchyStep, ...]
     side_steps: tuple[HierarchyStep, ...]
     leave_one_out: tuple[HierarchyStep, ...]
+    towards: str = ""  # of the line on which reaches are read, such as "+x"
 
     @property
     def every(self) -> tuple[HierarchyStep, ...]:
@@ -194,41 +207,77 @@ def hierarchy_of(
     leave_one_out = [
         (f"all but: {name}", dropped)
         for name, dropped in others
-        if dropped not in [each for _, each in up] and can_be_alone(name, names, scene)
+        if dropped not in [each for _, each in up] and can_be_alone(name, names, scene, h)
     ]
     steps: list[HierarchyStep] = []
+    scenes: list[Scene] = []
+    for name, dropped in (*up, *side, *leave_one_out):
+        step = HierarchyStep(name=name, dropped=dropped, model="none")
+        changed = scene
+        try:
+            changed, model = without(scene, dropped, update_rate=update_rate, points=points, h=h)
+            step = replace(step, model=named(model).name, body=changed.body)
+        except REASONS as error:
+            step = replace(step, error=reason(error))
+        steps.append(step)
+        scenes.append(changed)
+    steps = _with_shared_models(steps, scenes, len(up))
+    line = _outward(scene, scenes[len(up) - 1].body, element_size(scene, h))
+    probes = line.probes if line else scene.probes
     submitted: list[Future[tuple[Response, float, int]] | None] = []
     with (
         TemporaryDirectory(prefix="skinwave-") as cache,
         pool(1, renewed=True) as large, pool(1, renewed=True) as small,
     ):  # fmt: skip
-        for name, dropped in (*up, *side, *leave_one_out):
-            step = HierarchyStep(name=name, dropped=dropped, model="none")
-            try:
-                changed, model = without(scene, dropped, update_rate=update_rate, points=points)
-                step = replace(step, model=model, body=changed.body)
-                is_reduced = named(model).is_reduced
-                size = h or LARGER * default_size(scene.body) if is_reduced else h
-            except REASONS as error:
-                steps.append(replace(step, error=reason(error)))
+        for step, changed in zip(steps, scenes, strict=True):
+            if step.error:
                 submitted.append(None)
                 continue
-            coarse_first = is_reduced and name == ALMOST_UNDAMPED
-            steps.append(step)
+            is_reduced = named(step.model).is_reduced
+            size = h or min(element_size(scene), element_size(changed)) if is_reduced else h
+            coarse_first = is_reduced and step.name == ALMOST_UNDAMPED
             workers = large if is_reduced else small
-            submitted.append(workers.submit(_time, changed, model, size, cache, coarse_first))
+            whole = replace(changed, probes=probes)
+            submitted.append(workers.submit(_time, whole, step.model, size, cache, coarse_first))
         for k, future in enumerate(submitted):
             progress(steps[k].name, k / len(steps))
             if future:
-                steps[k] = _compute(steps[k], future, steps[:k])
+                steps[k] = _compute(scene, steps[k], future, steps[:k], line)
     first, second = len(up), len(up) + len(side)
     found = Hierarchy(
         scene=scene, steps=tuple(steps[:first]), side_steps=tuple(steps[first:second]),
-        leave_one_out=tuple(steps[second:]),
+        leave_one_out=tuple(steps[second:]), towards=line.towards if line else "",
     )  # fmt: skip
     if not found.efforts:
         raise ValueError(failure_text(found.failures))
     return found
+
+
+def _with_shared_models(
+    steps: Sequence[HierarchyStep], scenes: Sequence[Scene], count: int
+) -> list[HierarchyStep]:
+    """Return the steps with one model for each solid, where it takes the load: that of the last of
+    the first `count` steps on this body. Then both responses whose difference is the effect of a
+    load have the error of elements.
+    """
+    solids = [s for s in steps if s.body and s.body.is_solid and named(s.model).needs_body]
+    last = {step.body: step.model for step in steps[:count] if step in solids}
+
+    def model(step: HierarchyStep, scene: Scene) -> str:
+        shared = last.get(step.body, step.model)
+        return shared if step in solids and takes(named(shared), scene) else step.model
+
+    return [
+        replace(step, model=model(step, scene)) for step, scene in zip(steps, scenes, strict=True)
+    ]
+
+
+def _outward(scene: Scene, body: Body, h: float) -> Outward | None:
+    """Return the line on which the reach is read on skin; None if there is no such line."""
+    try:
+        return outward(scene, body, h) if body.is_skin else None
+    except REASONS:  # which the steps on this body have, too
+        return None
 
 
 def _time(
@@ -254,18 +303,27 @@ def _time(
 
 
 def _compute(
+    scene: Scene,
     step: HierarchyStep,
     future: Future[tuple[Response, float, int]],
     before: Sequence[HierarchyStep],
+    line: Outward | None,
 ) -> HierarchyStep:
-    """Return a step with its response or its error.
+    """Return a step with its response at the probes of the scene and its levels, or its error.
 
     Seconds and memory include those of an earlier step for the same body.
     """
     try:
-        response, seconds, memory = future.result()
+        whole, seconds, memory = future.result()
     except REASONS as error:
         return replace(step, error=reason(error))
+    count = len(scene.probes)
+    response = replace(whole, probes=whole.probes[:count], values=whole.values[:, :count])
+    if scene.body.is_skin:
+        levels = levels_at_probes(scene, whole)
+        step = replace(
+            step, level=float(levels[:count].max()), reach=line.reach(levels) if line else None
+        )
     same = (s for s in before if s.response and (s.body, s.model) == (step.body, step.model))
     if (first := next(same, None)) and first.response:
         spent = first.response.effort.seconds.items()
@@ -284,12 +342,11 @@ def _effect(
     assert after.response
     changes, scale = _changes(after.response, before.response)
     most = int(np.argmax(changes))
-    level = None
-    if scene.body.is_skin:
-        levels = [_level(scene, each) for each in (before.response, after.response)]
-        level = levels[1] - levels[0] if np.isfinite(levels).all() else None
+    levels = [-np.inf if step.level is None else step.level for step in (before, after)]
+    level = levels[1] - levels[0] if np.isfinite(levels).all() else None
     return Effect(
         name=after.name, waveform=float(changes[most]), where=scene.probes[most], level=level,
+        reach=(before.reach, after.reach),
         decibel=line_changes(scene, before.response, after.response, scale),
         alone=float(_changes(richest, alone)[0].max()) if alone else None,
         seconds=after.seconds - before.seconds,
@@ -303,16 +360,17 @@ def _changes(reference: Response, candidate: Response) -> tuple[Floats, float]:
     return np.asarray(agreement.relative_l2 * sizes / max(sizes.max(), TINY)), agreement.scale
 
 
-def _level(scene: Scene, response: Response) -> float:
-    """Return the highest sensation level in dB of a line at any probe, or minus infinity."""
+def levels_at_probes(scene: Scene, response: Response) -> Floats:
+    """Return the highest sensation level in dB of a line at each probe (p,), or minus infinity."""
     unit, pressure = "m" if response.record.of_body else "Pa", scene.pressure
     acting = published_load(pressure) if response.model == PUBLISHED.name else pressure
     table = lines_in_pulses(acting, response, candidates=ASSESSED)
     levels = [
-        sensation_level(table.amplitudes[name], f, unit=unit).max()
+        sensation_level(table.amplitudes[name], f, unit=unit)
         for name, f in table.frequencies.items() if f < HIGHEST
     ]  # fmt: skip
-    return float(max(levels, default=-np.inf))
+    silent = np.full((1, len(response.probes)), -np.inf)
+    return np.asarray(np.vstack([silent, *levels]).max(axis=0))
 
 
 def compared_lines(scene: Scene, response: Response) -> dict[str, float]:
@@ -357,15 +415,24 @@ def sentence(e: Effect) -> str:
 
 def _change_text(e: Effect) -> str:
     x, y = (1e3 * v for v in e.where)
-    level = (
-        "" if e.level is None else f", the sensation level by {decibel(e.level, signed=True)} dB"
-    )
-    time = "no extra time" if e.seconds <= NEGLIGIBLE_TIME else f"{e.seconds:.1f} s more"
-    return (
+    changes = [
         f"the waveform at ({x:g}, {y:g}) mm changes by "
-        f"{share_of(e.waveform, 'the motion of the strongest probe')}{level}. Then "
-        f"{ASSUMPTIONS[e.name]}, which takes {time}."
-    )
+        f"{share_of(e.waveform, 'the motion of the strongest probe')}"
+    ]
+    if e.level is not None:
+        changes.append(f"the sensation level by {decibel(e.level, signed=True)} dB")
+    with_it, without_it = map(_reach_text, e.reach)
+    if with_it != without_it:
+        changes.append(f"the reach above threshold from {with_it} to {without_it} mm")
+    time = "no extra time" if e.seconds <= NEGLIGIBLE_TIME else f"{e.seconds:.1f} s more"
+    *first, last = changes
+    text = f"{', '.join(first)}, and {last}" if first else last
+    return f"{text}. Then {ASSUMPTIONS[e.name]}, which takes {time}."
+
+
+def _reach_text(reach: Reach | None) -> str:
+    """Return a reach in mm, 0 if nothing is above threshold on the line."""
+    return "over " * reach.beyond + significant(1e3 * reach.metre, 2) if reach else "0"
 
 
 def _line_change(changes: dict[str, float]) -> str | None:
@@ -397,7 +464,7 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
     (folder / "effects.csv").write_bytes(Table(EFFECT_COLUMNS, map(_effect_row, effects)).to_csv())
     steps = Table(STEP_COLUMNS, map(_step_row, hierarchy.every), "steps")
     parts: list[Part] = [
-        Picture(png(_figure(effects), dpi=130), BARS, "relax"),
+        Picture(png(_figure(effects, hierarchy.towards), dpi=130), BARS, "relax"),
         Table(PAGE_COLUMNS, map(_page_row, effects)),
         Details("Steps and their warnings", [
             INTRODUCTION, steps, warnings_banner(hierarchy.efforts),
@@ -408,28 +475,52 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
     Report(title, [verdict], parts, richest, failures=hierarchy.failures).write(folder)
 
 
-def _figure(effects: list[Effect]) -> Figure:
-    """Draw a bar for each assumption, the largest effect at the top."""
-    figure = Figure(figsize=(7, 1 + 0.32 * len(effects)), layout="constrained")
-    axes = figure.add_subplot()
+def _figure(effects: list[Effect], towards: str) -> Figure:
+    """Draw the changes by each assumption, the largest at the top: waveform, level and reach."""
+    is_skin = any(e.level is not None for e in effects)
+    has_reach = any(any(e.reach) for e in effects)
+    panels = 1 + is_skin + has_reach
+    figure = Figure(figsize=(4 + 3 * panels, 1.2 + 0.34 * len(effects)), layout="constrained")
+    first, *others = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
+    rows = np.arange(len(effects))
     changes = [e.waveform for e in effects]
-    bars = axes.barh([e.name.replace("^2", "²") for e in effects], changes, color=BLUE, height=0.7)
-    texts = [
-        significant(e.waveform, 2)
-        + ("" if e.level is None else f",  {decibel(e.level, signed=True)} dB SL")
-        for e in effects
-    ]
-    axes.bar_label(bars, texts, padding=4, fontsize=9)
-    axes.invert_yaxis()
-    axes.set_xlim(0, 1.3 * max(changes, default=1.0))
-    axes.set_xlabel("change of the waveform over the motion of the strongest probe")
-    axes.spines[["top", "right"]].set_visible(False)
+    bars = first.barh(rows, changes, color=BLUE, height=0.7)
+    first.bar_label(bars, [significant(x, 2) for x in changes], padding=4, fontsize=9)
+    first.set_yticks(rows, [e.name.replace("^2", "²") for e in effects])
+    first.invert_yaxis()
+    first.set_xlim(0, 1.2 * max(changes, default=0.0) or 1.0)
+    first.set_xlabel("change of the waveform\nover the motion of the strongest probe")
+    if is_skin:
+        axes, levels = others[0], [e.level or 0.0 for e in effects]
+        bars = axes.barh(rows, levels, color=BLUE, height=0.7)
+        texts = ["" if e.level is None else decibel(e.level, signed=True) for e in effects]
+        axes.bar_label(bars, texts, padding=4, fontsize=9)
+        axes.axvline(0, color="black", linewidth=0.8)
+        axes.margins(x=0.3)
+        axes.set_xlabel("change of the\nsensation level, dB")
+    if has_reach:
+        axes = others[-1]
+        ends = np.array([[1e3 * r.metre if r else 0.0 for r in e.reach] for e in effects])
+        axes.hlines(rows, *ends.T, color=BLUE, linewidth=2)
+        axes.plot(ends[:, 0], rows, "o", color=BLUE, mfc="white", label="with the assumption")
+        axes.plot(ends[:, 1], rows, "o", color=BLUE, label="without it")
+        for row, effect in enumerate(effects):
+            axes.annotate(
+                " to ".join(map(_reach_text, effect.reach)), (ends[row].max(), row), (8, 0),
+                textcoords="offset points", va="center", fontsize=9,
+            )  # fmt: skip
+        axes.set_xlim(-0.05 * ends.max(), 1.6 * ends.max())
+        axes.set_xlabel(f"reach above threshold from the path\nalong {towards}, mm")
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    for axes in (first, *others):
+        axes.spines[["top", "right"]].set_visible(False)
     return figure
 
 
 def _effect_row(e: Effect) -> list[object]:
     return [
         e.name, 100 * e.waveform, f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})", e.level,
+        *(_reach_text(r) if any(e.reach) else None for r in e.reach),
         None if e.alone is None else 100 * e.alone, e.seconds,
         ", ".join(f"{name} {decibel(x, signed=True)}" for name, x in e.decibel.items()),
     ]  # fmt: skip
@@ -438,7 +529,8 @@ def _effect_row(e: Effect) -> list[object]:
 def _page_row(e: Effect) -> list[object]:
     where = f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})"
     seconds = e.seconds if e.seconds > NEGLIGIBLE_TIME else None
-    return [e.name, e.waveform, where, e.level, e.alone, _line_change(e.decibel), seconds]
+    reach = " to ".join(map(_reach_text, e.reach)) if any(e.reach) else None
+    return [e.name, e.waveform, where, e.level, reach, e.alone, _line_change(e.decibel), seconds]
 
 
 def _step_row(step: HierarchyStep) -> list[object]:

@@ -1,0 +1,95 @@
+"""Flat body of infinite width with the strata that a body has under the focus."""
+
+from dataclasses import replace
+from functools import lru_cache
+from math import inf
+
+import numpy as np
+
+from meshes import TetMesh
+from meshes.facets import heights_over
+from simple_model.layers.material import Material
+from skinwave.bodies.body import Body
+from skinwave.bodies.build import Build, build
+from skinwave.bodies.parts import FLAT, PHALANX, PLAIN, Layer
+from skinwave.typing import Floats, Ints
+
+RIGID = 100.0  # shear modulus over that of the tissue above, from which a stratum holds it
+THINNEST = 1e-6  # m: shorter pieces of a vertical line are round-off
+FACES = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
+
+
+def flattened(body: Body, places: Floats, h: float) -> Body:
+    """Return a flat body without reflecting sides, with the strata of a body under the focus.
+
+    Solids become a slab with absorbing sides. Palms and discs are everywhere as deep as in their
+    middle. In bodies with regions, the strata are those on the vertical line through the first of
+    the places (n, 2) in m, in a mesh with elements of h in m. A stratum `RIGID` times as stiff as
+    the one above it, such as bone, is the clamped base. The slab contains all places. A sheet
+    keeps its sides, because the sides of a stretched sheet cannot absorb. Raises a ValueError if
+    the first place is not above the body.
+    """
+    if body.of_kind.is_plate:
+        flat = replace(body.mounting, curl_x=0.0, curl_y=0.0)
+        return replace(body, mounting=flat, placement=FLAT)
+    width, height = np.maximum([body.width, body.height], 2 * np.abs(places).max(axis=0)).tolist()
+    slab = {
+        "kind": "slab", "sides": "absorbing", "placement": FLAT, "relief": PLAIN, "bone": PHALANX,
+        "file": "", "unit": "m", "up": "+z", "regions": (), "width": width, "height": height,
+    }  # fmt: skip
+    if "regions" not in body.of_kind.keys:
+        return replace(body, **slab)
+    column = _column(body, places[0], h)
+    stiffness = [solid.shear_modulus + solid.fast_modulus for _, solid in column]
+    held = [k for k in range(1, len(column)) if stiffness[k] > RIGID * stiffness[k - 1]]
+    if held:
+        column, slab["base"], slab["base_stiffness"] = column[: held[0]], "clamped", 0.0
+    layers = tuple(Layer(thickness=thickness, material=solid) for thickness, solid in column)
+    depth = sum(layer.thickness for layer in layers)
+    slab |= {"layers": layers[:-1], "material": layers[-1].material, "depth": depth}
+    return replace(body, **slab)
+
+
+@lru_cache(maxsize=8)
+def meshed(body: Body, h: float) -> Build:
+    """Return a body meshed without its layers, with elements of h in m."""
+    return build(replace(body, layers=()), h)
+
+
+def _column(body: Body, place: Floats, h: float) -> list[tuple[float, Material]]:
+    """Thickness in m and material of each stratum below a place (2,) in m, down to a gap."""
+    built = meshed(body, h)
+    upper, lower, region = _crossed(built.mesh, place)
+    if not len(upper):
+        x, y = 1e3 * place
+        raise ValueError(
+            f"the focus starts at ({x:g}, {y:g}) mm, which is not above the body; move the path or "
+            "the body"
+        )
+    pieces: list[tuple[float, Material]] = []
+    end = 0.0
+    tops, bottoms = (upper[0] - upper).tolist(), (upper[0] - lower).tolist()
+    for top, bottom, number in zip(tops, bottoms, region.tolist(), strict=True):
+        if top > end + THINNEST:
+            break
+        strata = body.strata if number == 0 else ((0.0, built.material[number]),)
+        starts = [start for start, _ in strata]
+        for (start, solid), below in zip(strata, [*starts[1:], inf], strict=True):
+            thickness = min(bottom, below) - max(end, start)
+            if thickness > THINNEST:
+                if pieces and pieces[-1][1] == solid:
+                    thickness += pieces.pop()[0]
+                pieces.append((thickness, solid))
+        end = max(end, bottom)
+    return pieces
+
+
+def _crossed(mesh: TetMesh, place: Floats) -> tuple[Floats, Floats, Ints]:
+    """Heights in m at which a vertical line enters and leaves tetrahedra, and their regions, from
+    the top downwards."""
+    faces = mesh.points[mesh.tets[:, FACES]].reshape(-1, 3, 3)
+    heights = heights_over(faces, place).reshape(-1, 4)
+    upper, lower = heights.max(axis=1), np.where(heights > -inf, heights, inf).min(axis=1)
+    crossed = np.flatnonzero(upper - lower > THINNEST)
+    crossed = crossed[np.argsort(-upper[crossed], kind="stable")]
+    return upper[crossed], lower[crossed], mesh.region[crossed]

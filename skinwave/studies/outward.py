@@ -1,0 +1,83 @@
+"""Reach above the detection threshold, read on one line from the path outwards."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.load_and_probe import on_surface
+from skinwave.bodies.flattened import meshed
+from skinwave.results.propagation import Reach
+from skinwave.scene.scene import Body, Scene
+from skinwave.typing import Floats
+
+FARTHEST, STEP = 40e-3, 0.5e-3  # m: longest line, and resolution of its end on a body
+# Distances of probes, in units of the smaller of 5 mm and a quarter of the line.
+UNIT, PLACED = 5e-3, np.array([0, 1, 2, 3, 4, 6, 8])
+INNER = 0.9  # of the way to the edge of the body, where its surface slopes
+SAME = 1e-6  # m
+LOWEST = -100.0  # dB, of what does not vibrate
+AXES = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outward:
+    """Probes on a line that leaves the path `towards` +x, -x, +y or -y.
+
+    `distances` (k,) in m are those from the path, `index` (k,) the numbers of these probes among
+    all `probes`, which begin with those of the scene.
+    """
+
+    probes: tuple[tuple[float, float], ...]
+    towards: str
+    distances: Floats
+    index: list[int]
+
+    def reach(self, levels: Floats) -> Reach | None:
+        """Return how far levels (p,) in dB at all probes are above 0; None if not at the path."""
+        level = np.maximum(levels[self.index], LOWEST)
+        below = np.flatnonzero(level <= 0)
+        if not len(below):
+            return Reach(metre=float(self.distances[-1]), beyond=True)
+        if not (k := int(below[0])):
+            return None
+        share = level[k - 1] / (level[k - 1] - level[k])
+        near, far = self.distances[k - 1 : k + 1]
+        return Reach(metre=float(near + (far - near) * share))
+
+
+def outward(scene: Scene, body: Body, h: float) -> Outward | None:
+    """Return probes from the path towards the outermost probe, on a body whose curved surface is
+    meshed with elements of h in m; None if the path is at its edge.
+
+    The line begins at the outermost point of the path, so that the distance along it is that from
+    the path.
+    """
+    path, probes = scene.tacton.trajectory.outline, scene.probe_points
+    beyond = {name: (probes @ axis).max() - (path @ axis).max() for name, axis in AXES.items()}
+    towards = max(AXES, key=lambda name: round(beyond[name], 9))
+    axis = np.array(AXES[towards])
+    outermost = path[path @ axis > (path @ axis).max() - SAME]
+    start = outermost[np.argmin(np.linalg.norm(outermost, axis=1))]
+    steps = np.arange(round(FARTHEST / STEP) + 1) * STEP
+    off = np.flatnonzero(~_on_body(body, start + steps[:, None] * axis, h))
+    steps = steps[: off[0]] if len(off) else steps
+    if len(steps) < len(PLACED):
+        return None
+    end = INNER * steps[-1] if len(off) else FARTHEST
+    distances = min(UNIT, end / 4) * PLACED
+    distances = distances[distances <= end + SAME]
+    every, index = list(scene.probes), []
+    for place in start + distances[:, None] * axis:
+        apart = np.linalg.norm(np.array(every) - place, axis=1)
+        index.append(int(np.argmin(apart)) if apart.min() < SAME else len(every))
+        if index[-1] == len(every):
+            every.append((float(place[0]), float(place[1])))
+    return Outward(probes=tuple(every), towards=towards, distances=distances, index=index)
+
+
+def _on_body(body: Body, places: Floats, h: float) -> np.ndarray:
+    """Mask (k,) of the places (k, 2) in m on the surface of a body."""
+    if body.of_kind.is_plate or body.of_kind.is_layer:
+        half = np.array([body.width, body.height]) / 2
+        return np.asarray((np.abs(places) < half).all(axis=1))
+    return on_surface(meshed(body, h).mesh, places)
