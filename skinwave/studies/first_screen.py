@@ -43,7 +43,8 @@ class FirstScreen:
     load and as published, and of bodies, and maps and views by column; effects of propagation by
     Tacton and column. If known: smallest and largest share outside over the range of materials,
     error budget of `body`, and measured places. `added` are the lines that a sheet which stretches
-    adds to those of its load in any Tacton, by column.
+    adds to those of its load in any Tacton, by column, and `checks` are runs of the flat slab that
+    is as deep as a body under the focus.
     """
 
     kernel: Run
@@ -53,6 +54,7 @@ class FirstScreen:
     maps: Mapping[str, SurfaceField] = field(default_factory=dict)
     views: Sequence[View] = ()
     added: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    checks: Mapping[str, Run] = field(default_factory=dict)
     shares: tuple[float, float] | None = None
     budget: ErrorBudget | None = None
     measured: "MeasuredPlaces | None" = None
@@ -83,7 +85,10 @@ def effects_of(
 
 
 def first_screen(
-    groups: Mapping[str, Sequence[Run]], maps_of: Callable[[Run], Maps], views: Sequence[View] = ()
+    groups: Mapping[str, Sequence[Run]],
+    maps_of: Callable[[Run], Maps],
+    views: Sequence[View] = (),
+    checks: Mapping[str, Run] | None = None,
 ) -> FirstScreen | None:
     """Return the first screen, or None unless a body and both kernels were run."""
     group = groups.get(first_name(groups), [])
@@ -97,7 +102,7 @@ def first_screen(
             maps |= {kernel.column: own[1], run.column: own[0]}
     first = FirstScreen(
         kernel=kernel, published=published, bodies=bodies, effects=effects_of(groups, maps_of),
-        maps=maps, views=views, added=_added(groups),
+        maps=maps, views=views, added=_added(groups), checks=checks or {},
     )  # fmt: skip
     if first.own[first.body.column].strongest is None:
         return first

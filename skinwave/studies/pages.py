@@ -161,7 +161,8 @@ def page_of(
     models = [*description.model_paragraphs(runs), *modelled]
     body.append(Details("What was modelled, and what was left out", models))
     if any(len(group) > 1 for group in groups.values()):
-        body.append(Details("How far the models agree", [tables.agreement_table(groups)]))
+        agreement = tables.agreement_parts(groups, first.checks if first else {})
+        body.append(Details("How far the models agree", agreement))
     effort = tables.effort_table(_efforts_by_body(runs), len(groups), seconds)
     body.append(Details("Errors and effort", effort))
     again: list[Part] = [preformat(command)] if command else []

@@ -4,12 +4,15 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from simple_model import Response
 from simple_model.load.tacton import repetition_frequencies
+from skinwave.bodies.flattened import flattened
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.measure.comparison import (
     Measured,
@@ -19,7 +22,8 @@ from skinwave.measure.comparison import (
     runs_to_draw,
 )
 from skinwave.models import named
-from skinwave.models.limits import check_takes
+from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.limits import check_takes, takes
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
 from skinwave.models.point_kernel import SAME_LOAD
@@ -34,7 +38,7 @@ from skinwave.results.run import Run
 from skinwave.results.surface import element_map, grid, map_motions
 from skinwave.results.views import View, body_view, flat_view, kernel_view
 from skinwave.scene import paper15
-from skinwave.scene.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene, with_body
 from skinwave.studies.album import KERNEL_REACH, scene_columns
 from skinwave.studies.first_screen import (
     Maps,
@@ -113,23 +117,20 @@ def run_study(
     Each body has one model: the given one, finite elements if their size is given, or the most
     complete one that plans choose for its scenes. A body of one scene is planned as by `run`; one
     of several has elements of the given size, of that in `paper15.SIZES`, or of the default size. A
-    measurement is compared with the models of its
-    Tacton. `more` are further parts of the page; `failures` are of parts made before. After an
-    interrupt or a failure, the other runs are compared and written; raises a ValueError if all
-    fail.
+    measurement is compared with the models of its Tacton. `more` are further parts of the page;
+    `failures` are of parts made before. After an interrupt or a failure, the other runs are
+    compared and written; raises a ValueError if all fail.
     """
     models = _models(scenes, options)
     started, planned = time.perf_counter(), sum(map(len, scenes.values()))
     progress = options.progress
     groups: dict[str, list[Run]] = {}
-    failed, interrupted = dict(failures or {}), True
-    prepared: dict[str, ReducedBody] = {}
+    found, interrupted = Found(failures=dict(failures or {})), True
+    failed = found.failures
     options = replace(options, model="auto", progress=silent)
-    surfaces: dict[tuple[str, str], Surface] = {}
     with one_thread(), pool(2) as workers:
         with suppress(KeyboardInterrupt):
-            found = _runs(scenes, models, options, prepared, progress, workers, failed, surfaces)
-            for run in found:
+            for run in _runs(scenes, models, options, progress, workers, found):
                 write_run(folder / run.tacton / run.column, run)
                 groups.setdefault(run.tacton, []).append(run)
             interrupted = False
@@ -146,11 +147,8 @@ def run_study(
         write_responses(folder / "responses.npz", by_name)
         first = None
         if not interrupted:
-            first = first_screen(
-                groups,
-                partial(_maps, surfaces, failed),
-                _views(scenes[first_name(scenes)], surfaces),
-            )
+            views = _views(scenes[first_name(scenes)], found.surfaces)
+            first = first_screen(groups, found.maps, views, found.checks)
     parts: list[document.Part] = [*more]
     figures: dict[str, Sequence[Run]] = dict(groups)
     conclusions: list[str] = []
@@ -160,7 +158,7 @@ def run_study(
         assert measured
         quantity = measured.measurement.quantity
         comparison = compare_measured(
-            measured, [in_quantity(run, quantity, prepared) for run in group]
+            measured, [in_quantity(run, quantity, found.prepared) for run in group]
         )
         conclusions += [comparison_page.conclusion(comparison, c) for c in comparison.bodies]
         comparison_page.write_tables(folder, comparison)
@@ -215,26 +213,49 @@ class Surface:
     view: View | None = None
 
 
-Surfaces = tuple[dict[tuple[str, str], Surface], dict[str, str]]  # by Tacton and column; failures
+Surfaces = dict[tuple[str, str], Surface]  # by Tacton and column
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Found:
+    """What a study finds beside its runs: reduced bodies by column, surfaces, runs of flat slabs
+    beside bodies by column, and reasons of failed parts.
+    """
+
+    prepared: dict[str, ReducedBody] = field(default_factory=dict)
+    surfaces: Surfaces = field(default_factory=dict)
+    checks: dict[str, Run] = field(default_factory=dict)
+    failures: dict[str, str] = field(default_factory=dict)
+
+    def collect(self, surfaces: Surfaces, failures: Mapping[str, str]) -> None:
+        """Add surfaces and failures of a worker."""
+        self.surfaces.update(surfaces)
+        self.failures.update(failures)
+
+    def maps(self, run: Run) -> Maps:
+        """Return the maps of a body and of the kernel, or none if they fail or are not known."""
+        if surface := self.surfaces.get((run.tacton, run.column)):
+            return surface.maps
+        with or_failed(self.failures, f"map of {run.column}"):
+            return quick_maps(run)  # of a body that needs no mesh, but was computed by elements
+        return ()
 
 
 def _runs(
-    scenes: Scenes, models: Mapping[str, str], options: SolveOptions,
-    prepared: dict[str, ReducedBody], progress: Progress, workers: Executor,
-    failures: dict[str, str], surfaces: dict[tuple[str, str], Surface],
+    scenes: Scenes, models: Mapping[str, str], options: SolveOptions, progress: Progress,
+    workers: Executor, found: Found,
 ) -> Iterator[Run]:  # fmt: skip
     """Yield every run that does not fail, those of fast models first.
 
-    Bodies are reduced here, once for all Tactons, into `prepared`. Workers compute the coarser
-    bodies, for the errors, all other responses, and the `surfaces`.
+    Bodies are reduced here, once for all Tactons. Workers compute the coarser bodies, for the
+    errors, all other responses, surfaces and checks.
     """
+    prepared, failures = found.prepared, found.failures
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
     reduced = {column for column, model in models.items() if named(model).is_reduced}
     every.sort(key=lambda each: (named(models[each[1]]).seconds > SLOW, each[1] not in reduced))
-    several, size_of = (
-        len(scenes) > 1,
-        {column: replace(options, h=options.h or paper15.SIZES.get(column)) for column in reduced},
-    )
+    several, sizes = len(scenes) > 1, paper15.SIZES
+    size_of = {column: replace(options, h=options.h or sizes.get(column)) for column in reduced}
     coarse = {column: s for _, column, s in every if several and column in reduced}
     coarser = {c: workers.submit(coarser_body, s, size_of[c]) for c, s in coarse.items()}
     pictured = first_name(scenes)
@@ -248,6 +269,10 @@ def _runs(
         workers.submit(_element_surfaces, column, own, replace(options, model="auto"), part)
         for column, own in meshed.items()
     ]
+    flat = {
+        column: workers.submit(_flat_run, pictured, scene, options)
+        for column, scene in scenes[pictured].items() if column in reduced and scene.body.is_solid
+    }  # fmt: skip
     others = {
         (name, column): workers.submit(
             _response, name, column, scene, replace(options, model=models[column]),
@@ -277,7 +302,7 @@ def _runs(
                 response = assess(scene, response, body, size_of[column], compared=compared)
             elif column not in reduced:
                 response, shown = others[name, column].result()
-                _collect(shown, surfaces, failures)
+                found.collect(*shown)
         progress(f"response of {name} by {column}", (k + 1) / len(every))
         body_name = column if scene.body.of_kind.discretise else "none"
         if response:
@@ -285,7 +310,11 @@ def _runs(
     for column, future in zip(meshed, moved, strict=True):
         progress(f"maps of {column}", 1.0)
         with or_failed(failures, f"maps of {column}"):
-            _collect(future.result(), surfaces, failures)
+            found.collect(*future.result())
+    for column, slab in flat.items():
+        with or_failed(failures, f"flat slab beside {column}"):
+            if run := slab.result():
+                found.checks[column] = run
 
 
 def _report(progress: Progress, column: str, phase: str, fraction: float) -> None:
@@ -301,7 +330,7 @@ def _played(scenes: Mapping[str, Scene]) -> tuple[float, int]:
 
 def _response(
     name: str, column: str, scene: Scene, options: SolveOptions, part: tuple[float, int] | None
-) -> tuple[Response, Surfaces]:
+) -> tuple[Response, tuple[Surfaces, dict[str, str]]]:
     """Return a response and, of a body whose surface needs no mesh, its map and view."""
     if not scene.body.of_kind.discretise:
         return compute(scene, options.model), ({}, {})
@@ -316,12 +345,25 @@ def _response(
     return response, ({(name, column): surface}, failures)
 
 
+def _flat_run(name: str, scene: Scene, options: SolveOptions) -> Run | None:
+    """Return the run of an infinite slab with the strata that a body has under the focus, or None
+    if the wavenumber integral does not take it.
+    """
+    places = np.vstack([scene.tacton.trajectory.outline, scene.probe_points])
+    slab = flattened(scene.body, places, default_size(scene.body))
+    flat = with_body(scene, slab)
+    if not takes(FLAT_BODY, flat):
+        return None
+    response = solve(flat, plan(flat, replace(options, model=FLAT_BODY.name)))
+    return Run(tacton=name, body="flat slab", scene=flat, response=response)
+
+
 def _element_surfaces(
     column: str, scenes: Mapping[str, Scene], options: SolveOptions, part: tuple[float, int]
-) -> Surfaces:
+) -> tuple[Surfaces, dict[str, str]]:
     """Return the maps of one meshed body under all Tactons, and one view."""
     names, failures = {scene: name for name, scene in scenes.items()}, dict[str, str]()
-    surfaces: dict[tuple[str, str], Surface] = {}
+    surfaces: Surfaces = {}
     with or_failed(failures, f"map of {column}"):
         for scene, motion in map_motions(list(scenes.values()), options):
             view, name = None, names[scene]
@@ -332,23 +374,7 @@ def _element_surfaces(
     return surfaces, failures
 
 
-def _collect(
-    found: Surfaces, surfaces: dict[tuple[str, str], Surface], failures: dict[str, str]
-) -> None:
-    surfaces.update(found[0])
-    failures.update(found[1])
-
-
-def _maps(surfaces: Mapping[tuple[str, str], Surface], failures: dict[str, str], run: Run) -> Maps:
-    """Return the maps of a body and of the kernel, or none if they fail or are not known."""
-    if found := surfaces.get((run.tacton, run.column)):
-        return found.maps
-    with or_failed(failures, f"map of {run.column}"):
-        return quick_maps(run)  # of a body that needs no mesh, but was computed by elements
-    return ()
-
-
-def _views(scenes: Mapping[str, Scene], surfaces: Mapping[tuple[str, str], Surface]) -> list[View]:
+def _views(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:
     """Return the views of the kernel and of the bodies under one Tacton, if there are any."""
     own = [view for each in surfaces.values() if (view := each.view)]
     kernel = kernel_view(scenes[SAME_LOAD.name], KERNEL_REACH, _played(scenes))

@@ -31,6 +31,11 @@ AGREEMENT = (
     "misfit at the best gain and delay", "delay at the probes, ms",
     "phase delay of the strongest component, ms", "spread over the probes at -6 / -20 dB, mm",
 )  # fmt: skip
+CHECKED = (
+    "The flat slab has the layers of the body under the focus and no sides. It is computed by the "
+    "wavenumber integral, independently of the elements; both agree on a slab (docs/accuracy.md). "
+    "What differs is due to the curved surface, the sides and the support of the body."
+)
 ERRORS = "body", "expected error of the waveform at the worst probe", "cure of the largest part"
 ERROR_RULE = "The squares of the parts add, because their causes are independent."
 EFFORT = (
@@ -147,27 +152,34 @@ def _disagreements(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
     ]
 
 
-def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Table:
-    """Return a table that compares pairs of responses that differ in one respect.
+def agreement_parts(runs: Mapping[str, Sequence[Run]], checks: Mapping[str, Run]) -> list[Part]:
+    """Return a table that compares pairs of responses that differ in one respect, and what the
+    comparison with flat slabs shows.
 
-    Drive law and focus change between the two kernels, propagation between kernel and body.
+    Drive law and focus change between the two kernels, propagation between kernel and body, shape
+    and support between a body and the flat slab in `checks`, by column.
     """
     rows = [
         [name, changed, f"{label(a.column)} → {label(b.column)}", *_agreement(a, b)]
         for name, group in runs.items()
-        for changed, a, b in _pairs(group)
+        for changed, a, b in _pairs(group, checks)
     ]
-    return Table(AGREEMENT, rows)
+    return [Table(AGREEMENT, rows), *[CHECKED] * bool(checks)]
 
 
-def _pairs(group: Iterable[Run]) -> list[tuple[str, Run, Run]]:
+def _pairs(group: Iterable[Run], checks: Mapping[str, Run]) -> list[tuple[str, Run, Run]]:
     """Return names of changes, each with the two runs before and after it."""
     runs = {run.column: run for run in group}
     kernel, published = runs.get(SAME_LOAD.name), runs.get(PUBLISHED.name)
     if kernel is None:
         return []
-    first = [("drive law and focus", published, kernel)] if published else []
-    return first + [("propagation", kernel, run) for run in runs.values() if run.is_motion]
+    pairs = [("drive law and focus", published, kernel)] if published else []
+    pairs += [("propagation", kernel, run) for run in runs.values() if run.is_motion]
+    return pairs + [
+        ("shape and support", flat, run)
+        for column, flat in checks.items()
+        if (run := runs.get(column)) and run.tacton == flat.tacton
+    ]
 
 
 def _agreement(a: Run, b: Run) -> list[str]:
