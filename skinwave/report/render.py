@@ -9,8 +9,13 @@ from dataclasses import dataclass
 from math import floor, log10
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from meshes.tetmesh import boundary_facets
@@ -30,11 +35,15 @@ CAMERAS = {
     "top": ((0.0, 0.0, 1.0), (0.0, 0.06, 0.0), 0.72),
 }
 LARGEST_DRAWN = 0.06  # of the body's width, for the largest motion
-BAR = 10.0  # mm, length of the scale bar
-FONT, VTK_FONT_FILE = findfont("DejaVu Sans"), 4  # the font of all figures; the kind of font
+BARS = (10.0, 5.0, 2.0, 1.0)  # mm, lengths of scale bars
+FONT = findfont("DejaVu Sans")  # of all figures
 COLUMN = 0.26  # width of the colour bar over the height of the picture
-WIDTH = 1600  # pixels, of a picture at least
+WIDTH = 1600  # pixels, of a picture that is not for print
+PAGE, LETTERS = 7.0, 8.0  # inch, width of a page; points, size of letters at that width
+LEAST_LETTER = 11.0  # pixels, in films
+SHARP = 35.0  # degrees, of edges that are not smoothed
 LIFT = 0.4  # mm, of path, probes and focus above the surface
+PATH, FOCUS, PROBE = "black", "black", "#ffd000"  # colours of marks
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,24 +85,40 @@ def picture(
 ) -> Image:  # fmt: skip
     """Return a picture (height, width, 3) of views side by side, from one of `CAMERAS`.
 
-    With `cut`, the half of each body nearer to the camera is omitted.
+    With `cut`, the half of each body nearer to the camera is omitted. In print, one view has the
+    width of a column, and several have that of a page.
     """
     width, height = style.panel
-    larger = max(1.0, WIDTH / (len(views) * width + COLUMN * height))
+    inch = style.size(PAGE if len(views) > 1 else PAGE / 2, PAGE)[0] if style.columns else PAGE
+    larger = pixels(style, inch) / (len(views) * width + COLUMN * height)
     panel = round(larger * width), round(larger * height)
-    with stage(views, style, camera=camera, cut=cut, panel=panel) as show:
+    with stage(views, style, camera=camera, cut=cut, panel=panel, inch=inch) as show:
         return show(frame)
+
+
+def pixels(style: Style, inch: float) -> int:
+    """Return the width in pixels of a picture that is `inch` wide in print."""
+    return round(inch * style.dpi) if style.columns else WIDTH
+
+
+def raster(figure: Figure, dpi: float) -> Image:
+    """Return the picture (height, width, 3) of a figure."""
+    figure.dpi = dpi
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())[..., :3]
 
 
 @contextmanager
 def stage(
     views: Sequence[View], style: Style, *, camera: str = "tilted", cut: bool = False,
-    panel: tuple[int, int] | None = None,
+    panel: tuple[int, int] | None = None, inch: float = PAGE,
 ) -> Iterator[Callable[[int], Image]]:  # fmt: skip
     """Context manager that builds a plotter once and yields a function from a frame to a picture.
 
     All views share a colour scale: motion into the body relative to the largest of each model or,
     for a single view, in its unit; other quantities in their unit, from 0 if they have no sign.
+    Letters have `LETTERS` points in a picture that is `inch` wide.
     """
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
@@ -101,50 +126,62 @@ def stage(
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # warnings about displays
     width, height = panel or style.panel
     column = round(COLUMN * height)
-    share = [width / column] * len(views) + [1.0]
+    letter = max(LETTERS / 72 * (width * len(views) + column) / inch, LEAST_LETTER)
     plotter = pv.Plotter(
-        off_screen=True, lighting="none", shape=(1, len(views) + 1), border=False,
-        col_weights=share, window_size=(width * len(views) + column, height),
+        off_screen=True, lighting="none", shape=(1, len(views)), border=False,
+        window_size=(width * len(views), height),
     )  # fmt: skip
     try:
         plotter.set_background(style.paper)
-        small = height / 432 * 11
         limits, title = _colour_scale(views)
+        bar = _colour_bar(limits, title, style, letter, (column, height))
         panels = []
         for k, view in enumerate(views):
             plotter.subplot(0, k)
             panels.append(make_panel(view, cut))
-            actor = _draw_panel(plotter, panels[-1], style, limits, small, lit=camera != "top")
-            if not cut:  # the rim of the surface at rest
+            _draw_panel(plotter, panels[-1], style, limits, letter, lit=camera != "top")
+            if not (cut or len(view.tets)):  # the rim of the surface at rest
                 low, high = view.places.min(axis=0), view.places.max(axis=0)
                 rim = np.where([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], high, low)
                 plotter.add_mesh(_line(rim, cut=False), color="#9a9a9a", line_width=1)
             _set_camera(plotter, camera, panels)
-        plotter.subplot(0, len(views))
-        bar = plotter.add_scalar_bar(
-            title, mapper=actor.mapper, vertical=True, color=style.ink, n_labels=5,
-            label_font_size=int(1.2 * small), title_font_size=int(1.2 * small), fmt="%.3g",
-            position_x=0.2, position_y=0.12, width=0.55, height=0.7,
-        )  # fmt: skip
-        for text in (bar.GetLabelTextProperty(), bar.GetTitleTextProperty()):
-            text.SetFontFile(FONT)
-            text.SetFontFamily(VTK_FONT_FILE)
         plotter.subplot(0, 0)
 
         def show(frame: int) -> Image:
             set_frame(panels, frame, limits[1])
             plotter.subplot(0, 0)
             stamp = f"t = {1e3 * views[0].times[frame]:.2f} ms"
-            plotter.add_text(
-                stamp, position=(0.66, 0.03), viewport=True, font_size=0.85 * small, font_file=FONT,
-                color=style.ink, name="time", render=False,
-            )  # fmt: skip
+            _write(plotter, stamp, (0.66, 0.03), letter, style.ink, name="time", render=False)
             plotter.render()  # otherwise the screenshot is the previous picture
-            return np.asarray(plotter.screenshot(None, return_img=True, scale=style.oversampling))
+            return np.hstack([plotter.screenshot(None, return_img=True), bar])
 
         yield show
     finally:
         plotter.close()
+
+
+def _write(
+    plotter: Any, text: str, place: tuple[float, float], letter: float, ink: str, **options: Any
+) -> None:
+    """Write text with letters of so many pixels at a place of the current panel."""
+    plotter.add_text(
+        text, position=place, viewport=True, font_size=letter / 2, font_file=FONT, color=ink,
+        **options,
+    )  # fmt: skip
+
+
+def _colour_bar(
+    limits: tuple[float, float], title: str, style: Style, letter: float, size: tuple[int, int]
+) -> Image:
+    """Return the picture of a colour bar of a size in pixels."""
+    dpi = 72 * letter / style.font
+    with mpl.rc_context(style.rc):
+        figure = Figure(figsize=(size[0] / dpi, size[1] / dpi))
+        ax = figure.add_axes((0.1, 0.12, 0.18, 0.66))
+        shades = mpl.cm.ScalarMappable(Normalize(*limits), SIGNED if limits[0] else SEQUENTIAL)
+        figure.colorbar(shades, cax=ax, ticks=MaxNLocator(6, steps=[1, 2, 5, 10]))
+        figure.text(0.1, 0.8, title, va="bottom", ha="left")
+        return raster(figure, dpi)
 
 
 def _colour_scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
@@ -153,12 +190,12 @@ def _colour_scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
     if shades:
         shown = quantity(shades[0].quantity)
         most = shown.per_unit * max(float(np.abs(shade.values).max()) for shade in shades) or 1.0
-        return (-most if shown.invariant is None else 0.0, most), f"{shown.shown}\n"
+        return (-most if shown.invariant is None else 0.0, most), shown.shown
     if len(views) > 1:
-        return (-1.0, 1.0), "over the\nlargest\n"
+        return (-1.0, 1.0), "over the\nlargest"
     view = views[0]
     most = view.quantity.per_unit * view.peak
-    return (-most, most), f"{view.quantity.shown}\n"
+    return (-most, most), view.quantity.shown
 
 
 def make_panel(view: View, cut: bool = False) -> Panel:
@@ -167,6 +204,9 @@ def make_panel(view: View, cut: bool = False) -> Panel:
 
     nodes, triangles = outer_surface(view, cut)
     skin = pv.PolyData.from_regular_faces(1e3 * view.points[nodes], triangles)
+    skin["node"] = nodes
+    skin = skin.compute_normals(feature_angle=SHARP, split_vertices=True)  # edges stay sharp
+    nodes = np.asarray(skin["node"])
     skin["motion"] = np.zeros(len(nodes), np.float32)
     path, probes = path_points(view.scene), view.scene.probe_points
     reach = np.abs(view.places).max(axis=0)
@@ -211,46 +251,51 @@ def _lift(places: Floats) -> Floats:
 
 
 def _draw_panel(
-    plotter: Any, panel: Panel, style: Style, limits: tuple[float, float], small: float, *,
+    plotter: Any, panel: Panel, style: Style, limits: tuple[float, float], letter: float, *,
     lit: bool,
-) -> Any:  # fmt: skip
-    """Draw a panel; return the actor of its surface."""
+) -> None:  # fmt: skip
+    """Draw a panel."""
     view = panel.view
-    actor = plotter.add_mesh(
+    plotter.add_mesh(
         panel.skin, scalars="motion", cmap=SIGNED if limits[0] else SEQUENTIAL, clim=limits,
-        show_scalar_bar=False,
+        show_scalar_bar=False, smooth_shading=True,
         ambient=0.3 if lit else 0.0, diffuse=0.8 if lit else 1.0, lighting=lit,
     )  # fmt: skip
-    balls, pixel = {"render_points_as_spheres": True}, small / 11  # of a panel of 432 pixels
+    balls, pixel = {"render_points_as_spheres": True}, letter / 16
     for mark, _ in panel.marks:
         if mark.n_lines:
-            plotter.add_mesh(mark, color="black", line_width=2 * pixel)
+            plotter.add_mesh(mark, color=PATH, line_width=2 * pixel)
         else:
-            plotter.add_mesh(mark, color="#ffd000", point_size=10 * pixel, **balls)
-    plotter.add_mesh(panel.focus, color="black", point_size=15 * pixel, **balls)
+            plotter.add_mesh(mark, color=PROBE, point_size=10 * pixel, **balls)
+    plotter.add_mesh(panel.focus, color=FOCUS, point_size=15 * pixel, **balls)
     own = colour(view.column)
-    plotter.add_text(label(view.column), position=(0.04, 0.92), viewport=True,
-                     font_size=1.1 * small, font_file=FONT,
-                     color=style.ink if own == "#000000" else own)  # fmt: skip
-    plotter.add_text(scale_text(view), position=(0.04, 0.86), viewport=True,
-                     font_size=0.75 * small, font_file=FONT, color=style.ink)  # fmt: skip
-    _add_scale_bar(plotter, view, style, small)
-    return actor
+    ink = style.ink if own == "#000000" else own
+    _write(plotter, label(view.column), (0.04, 0.92), 1.25 * letter, ink)
+    text = scale_text(view).replace("; ", ";\n").replace("times, ", "times,\n")
+    rows = (1.4 + 1.15 * text.count("\n")) * letter / plotter.window_size[1]
+    _write(plotter, text, (0.04, 0.92 - rows), letter, style.ink)
+    _add_scale_bar(plotter, view, style, letter)
 
 
-def _add_scale_bar(plotter: Any, view: View, style: Style, small: float) -> None:
+def _add_scale_bar(plotter: Any, view: View, style: Style, letter: float) -> None:
     """Draw a scale bar along x, in front of the body."""
     import pyvista as pv
 
     left, front, bottom = 1e3 * view.points.min(axis=0)
-    ends = np.array([[left, front - 5, bottom], [left + BAR, front - 5, bottom]])
-    plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=4 * small / 11)
+    length = bar_length(1e3 * float(np.ptp(view.places, axis=0).max()))
+    ends = np.array([[left, front - length / 2, bottom], [left + length, front - length / 2, bottom]])
+    plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=letter / 4)
     plotter.add_point_labels(
-        ends.mean(axis=0)[None] - [0.0, 3.0, 0.0], [f"{BAR:g} mm"], font_size=int(1.2 * small),
-        font_file=FONT,
+        ends[1:] + [length / 4, 0.0, 0.0], [f"{length:g} mm"],
+        font_size=round(letter), font_file=FONT,
         text_color=style.ink, shape=None, show_points=False, always_visible=True,
-        justification_horizontal="center", justification_vertical="top",
+        justification_horizontal="left", justification_vertical="center",
     )  # fmt: skip
+
+
+def bar_length(side: float) -> float:
+    """Return the length in mm of the scale bar of a body with a side in mm."""
+    return next(length for length in BARS if length <= side / 4 or length == BARS[-1])
 
 
 def _set_camera(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
@@ -285,6 +330,9 @@ def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
             values = view.shade.values[frame, np.searchsorted(view.shade.nodes, panel.nodes)]
             values = np.float32(quantity(view.shade.quantity).per_unit) * values
         panel.skin["motion"] = values
+        panel.skin.compute_normals(
+            cell_normals=False, split_vertices=False, consistent_normals=False, inplace=True
+        )
         height = drawn[view.surface, 2]
         for mark, interpolate in panel.marks:
             raised = np.array(mark.points)

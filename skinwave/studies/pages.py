@@ -30,6 +30,7 @@ from skinwave.report.maps import (
     surfaces_figure,
 )
 from skinwave.report.palette import label
+from skinwave.report.renderer import renderer
 from skinwave.report.spectra import levels_figure, strongest_probe, tacton_figure
 from skinwave.report.styles import Style
 from skinwave.results.claims import assessable_runs, evaluate
@@ -57,6 +58,7 @@ from skinwave.system.document import (
     preformat,
 )
 from skinwave.system.effort import Progress, silent
+from skinwave.system.failures import or_failed
 from skinwave.system.table import Table
 
 PICTURES = "pictures"  # folder of a page's figures
@@ -68,6 +70,11 @@ ABOUT_MAPS = (
     "a slab is that of a laterally infinite layer. For other bodies only the Tacton above has a "
     "map. The strongest component is the largest over all probes. Its phase delay is known "
     "up to whole periods, and includes the phase lag of the body."
+)
+BODY_CAPTION = (
+    "at rest, as it is meshed, with its boundary conditions. A colour that fades in shows a "
+    "support that begins smoothly, and a plate below the body the condition of its base. A body of "
+    "several materials is cut open."
 )
 WAVEFORMS = "Waveforms and spectra; each row is a probe."
 LOADS = (
@@ -98,7 +105,7 @@ class Gallery:
     def image(self, name: str, pixels: Any, caption: str) -> Picture:
         """Return an image (ny, nx, 3) of bytes with its file."""
         image, buffer = Pillow.fromarray(pixels), io.BytesIO()
-        image.save(buffer, format="png", optimize=True)
+        image.save(buffer, format="png", optimize=True, dpi=(self.style.dpi, self.style.dpi))
         small, kind = _compress(image)
         return Picture(small, caption, name, kind, {"png": buffer.getvalue()})
 
@@ -124,7 +131,7 @@ def page_of(
     notes: Sequence[Part] = (),
     seconds: float | None = None,
     progress: Progress = silent,
-    failures: Mapping[str, str] | None = None,
+    failures: dict[str, str] | None = None,
 ) -> Report:
     """Return the page of runs by Tacton.
 
@@ -136,11 +143,13 @@ def page_of(
     modelled : further parts of what was modelled
     command, notes : command that makes the page again, and notes on it
     seconds : duration of all runs, the sum of their efforts if not given
-    failures : reasons of parts that failed
+    failures : reasons of parts that failed; those of this page are added
     """
     runs = [run for group in groups.values() for run in group]
     is_single = len(groups) == 1
-    body: list[Part] = [*before, *_waveforms(figures or groups, gallery, progress), *after]
+    failed = {} if failures is None else failures
+    shown = _body_parts(runs, gallery, failed) if is_single else []
+    body = [*before, *shown, *_waveforms(figures or groups, gallery, progress), *after]
     body += tables.claims_parts(evaluate(assessable_runs(runs)))
     effects = {} if is_single and first else effects_of(groups)
     if first:
@@ -168,8 +177,28 @@ def page_of(
         parts.insert(0, four_numbers(first))
         if not is_single:
             verdict[0] = f"Tacton {first.kernel.tacton}, one of {len(groups)}. {verdict[0]}"
-    shown = [" ".join(verdict)] if verdict else []
-    return Report(title, shown, parts, efforts_of(runs), PICTURES, failures or {})
+    verdict = [" ".join(verdict)] if verdict else []
+    return Report(title, verdict, parts, efforts_of(runs), PICTURES, failed)
+
+
+def _body_parts(
+    runs: Sequence[Run], gallery: Gallery, failures: dict[str, str]
+) -> list[Part]:
+    """Return the pictures of bodies that were computed by elements, or the reason why not."""
+    meshed = [run for run in runs if named(run.model).default_size]
+    if meshed and not renderer().is_available:
+        return [Section("The body", [f"Its picture is left out: {renderer().detail}."])]
+    parts: list[Part] = []
+    for run in meshed:
+        from skinwave.report.body_picture import body_picture, drawn_size  # slow to import
+
+        with or_failed(failures, f"picture of {run.column} at rest"):
+            size = significant(1e3 * drawn_size(run.scene.body), 2)
+            pixels = body_picture(run.scene, gallery.style)
+            caption = f"{label(run.column)} {BODY_CAPTION} Elements in this picture: {size} mm."
+            name = "body" if len(meshed) == 1 else f"body-{run.column}"
+            parts.append(gallery.image(name, pixels, caption))
+    return [Section("The body", parts)] if parts else []
 
 
 def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
