@@ -6,7 +6,7 @@ perspective.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -23,7 +23,18 @@ from skinwave.models.meshed import mesh_body
 from skinwave.report.figures import REPORT, legend
 from skinwave.report.maps import on_triangles
 from skinwave.report.palette import ORANGE, label
-from skinwave.report.render import FOCUS, LIFT, PATH, PROBE, SHARP, Image, bar_length, pixels, raster
+from skinwave.report.render import (
+    FOCUS,
+    LIFT,
+    PATH,
+    PROBE,
+    SHARP,
+    Image,
+    Projection,
+    bar_length,
+    pixels,
+    raster,
+)
 from skinwave.report.styles import Style
 from skinwave.results.views import path_points, split
 from skinwave.scene.scene import Scene
@@ -41,7 +52,7 @@ BOUNDARY = {
     ABSORBING: "#7db8dc",
 }  # fmt: skip
 REGIONS = ("#e8a48c", "#f3d7a2", "#c9705f", "#f6f1e0", "#b88fa8", "#a9a05f", "#d9c2d0")
-CAMERA = np.array([0.55, -1.0, 0.7])
+CAMERA = (0.55, -1.0, 0.7)  # direction to the camera
 # Lengths over the largest side of the body: the arrow to the device and the gap below it, the
 # distance of the scale bar, and the thickness of the support that is drawn below the body.
 ARROW, GAP, AWAY, PLATE = 0.16, 0.05, 0.1, 0.02
@@ -49,15 +60,19 @@ LABEL = 0.06  # the same, of the label of the scale bar
 LEAST_SHARE = 0.1  # of a support: where it is weaker, the surface is drawn as free
 EDGE = "#5a5f66"  # colour of the edges of elements
 STEEP = -0.7  # vertical component of the normal of a base, at most
+FRONT, SECTION = 0.05, 241  # mm, of thin layers before a section; points along it
 EDGES = np.array([[0, 3], [3, 1], [1, 4], [4, 2], [2, 5], [5, 0]])  # of a six-node facet
+
+
+LIT: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.6}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshedBody:
     """What is drawn of a meshed body: its points (n, 3) in mm, the tetrahedra (m, 10) outside the
     absorbing layer with their regions (m,), the facets (k, 6) on their boundary with the name of
-    the condition of each, shares (n,) of supports at the points, the upper facets (j, 6), and names
-    of regions and of thin layers.
+    the condition of each, shares (n,) of supports at the points, the upper facets (j, 6), names of
+    regions, and names and thicknesses in mm of the layers of the coat.
     """
 
     points: Floats
@@ -68,12 +83,12 @@ class MeshedBody:
     shares: Mapping[str, Floats]
     top: Ints
     names: Mapping[int, str]
-    coat: Mapping[str, float] = field(default_factory=dict)
+    coat: Sequence[tuple[str, float]] = ()
 
     @property
     def is_cut(self) -> bool:
         """Whether it is cut open to show its materials."""
-        return len(np.unique(self.region)) > 1 or bool(self.coat)
+        return len(np.unique(self.region)) > 1 or len(self.coat) > 0
 
 
 def drawn_size(body: Body) -> float:
@@ -100,7 +115,7 @@ def meshed_body(body: Body) -> MeshedBody:
         facets=facets, conditions=_conditions(body, build, facets, shares), shares=shares,
         top=facets[_among(facets, mesh.facets["top"])],
         names=dict(enumerate([*names, *(name for name, _ in body.regions)])),
-        coat={layer_name(body, solid): 1e3 * thickness for solid, thickness in layers},
+        coat=[(layer_name(body, solid), 1e3 * thickness) for solid, thickness in layers],
     )  # fmt: skip
 
 
@@ -153,17 +168,19 @@ def _conditions(body: Body, build: Build, facets: Ints, shares: Mapping[str, Flo
         found[~_among(facets, boundary_facets(mesh.tets))] = ABSORBING
     if build.absorbing is not None:
         found[_among(facets, build.absorbing)] = ABSORBING
+    most = np.full(len(facets), LEAST_SHARE)
     for name, share in shares.items():
-        rivals = [other for key, other in shares.items() if key != name]
-        most = np.max([*(each[facets[:, :3]].mean(axis=1) for each in rivals),
-                       np.full(len(facets), LEAST_SHARE)], axis=0)  # fmt: skip
-        found[share[facets[:, :3]].mean(axis=1) > most] = name
+        own = share[facets[:, :3]].mean(axis=1)
+        found[own > most] = name
+        most = np.maximum(own, most)
     for name, components in build.fixed.items():
         if components == "xyz":
             found[_among(facets, mesh.facets[name])] = CLAMPED
     if build.held is not None:
-        held = build.held[facets[:, :3]].any(axis=2).all(axis=1)
-        found[held] = SIMPLE if body.mounting.support == "simply" else CLAMPED
+        held = np.asarray(build.held.any(axis=1))
+        found[held[facets[:, :3]].all(axis=1)] = (
+            SIMPLE if body.mounting.support == "simply" else CLAMPED
+        )
     return found
 
 
@@ -182,45 +199,29 @@ def body_picture(scene: Scene, style: Style = REPORT) -> Image:
         height = HEIGHT * inch / WIDTH
         figure = Figure(figsize=(inch, height + ROW * (rows + 1)))
         dpi = pixels(style, inch) / inch
-        view = Projection.of(drawn, inch / height)
+        view = _projection(drawn, inch / height)
         image = _render(drawn, scene, style, view, (round(inch * dpi), round(height * dpi)))
         ax = figure.add_axes((0, ROW * (rows + 0.5) / figure.get_figheight(), 1,
                               height / figure.get_figheight()))  # fmt: skip
-        ax.imshow(image, extent=view.extent, aspect="auto")
+        low, high = view.middle - view.half, view.middle + view.half
+        ax.imshow(image, extent=(low[0], high[0], low[1], high[1]), aspect="auto")
+        ax.autoscale(False)
         ax.axis("off")
         _label(ax, drawn, scene.body, view)
         legend(figure, entries, columns, loc="lower center", fontsize=None, frameon=False)
         return raster(figure, dpi)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Projection:
-    """Directions to the right, up and towards the camera, and the visible rectangle in mm."""
-
-    axes: Floats
-    extent: tuple[float, float, float, float]
-
-    @classmethod
-    def of(cls, drawn: MeshedBody, aspect: float) -> "Projection":
-        """Return the projection that shows a body, its arrow and its scale bar."""
-        towards = CAMERA / np.linalg.norm(CAMERA)
-        right = np.cross([0.0, 0.0, 1.0], towards)
-        right /= np.linalg.norm(right)
-        axes = np.array([right, np.cross(towards, right), towards])
-        bar = _bar(drawn)
-        shown = [drawn.points[np.unique(drawn.facets)], bar, bar[:1] - LABEL * _side(drawn) * right]
-        flat = np.vstack([*shown, _arrow(drawn)]) @ axes[:2].T
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        middle = (low + high) / 2
-        half = 0.54 * max((high - low)[1], (high - low)[0] / aspect)
-        extent = (middle[0] - half * aspect, middle[0] + half * aspect,
-                  middle[1] - half, middle[1] + half)  # fmt: skip
-        return cls(axes=axes, extent=extent)
-
-    def at(self, point: Floats) -> tuple[float, float]:
-        """Return the place of a point (3,) in the picture."""
-        right, up = self.axes[:2] @ point
-        return float(right), float(up)
+def _projection(drawn: MeshedBody, aspect: float) -> Projection:
+    """Return the projection that shows a body, its arrow, and its scale bar with its label."""
+    side, bar = _side(drawn), _bar(drawn)
+    shown = [
+        drawn.points[np.unique(drawn.facets)],
+        _arrow(drawn),
+        bar,
+        bar[:1] - [LABEL * side, 0, 0],
+    ]
+    return Projection.of(CAMERA, np.vstack(shown), aspect)
 
 
 def _side(drawn: MeshedBody) -> float:
@@ -252,18 +253,19 @@ def _label(ax: Any, drawn: MeshedBody, body: Body, view: Projection) -> None:
     ax.annotate(f"{np.ptp(ends[:, 0]):g} mm", view.at(ends.mean(axis=0)), (-4, -4), **below,
                 ha="right")  # fmt: skip
     ax.annotate("to the device, +z", view.at(_arrow(drawn)[1]), (7, 0), **below, ha="left")
-    name, words = label(body_name(body)), body.of_kind.words(body).replace(" x ", " × ")
+    name, words = label(body_name(body)), body.of_kind.words(body).replace(" x ", " \u00d7 ")
     words = re.sub(r"(?<!\S)-(?=\w)", "\u2212", words)
     title = words if words.startswith(name) else f"{name}\n{words}"
     ax.text(0.01, 0.99, title, transform=ax.transAxes, va="top", linespacing=1.4)
-    ax.set(xlim=view.extent[:2], ylim=view.extent[2:])
 
 
 def _entries(drawn: MeshedBody, scene: Scene) -> dict[str, dict[str, Any]]:
     """Return the entries of the legend: boundary conditions, materials, path, focus and probes."""
     patch = {"ls": "", "marker": "s", "ms": 8, "mec": "0.4", "mew": 0.5}
     present = [name for name in BOUNDARY if (drawn.conditions == name).any()]
-    entries: dict[str, dict[str, Any]] = {name: {**patch, "mfc": BOUNDARY[name]} for name in present}
+    entries: dict[str, dict[str, Any]] = {
+        name: {**patch, "mfc": BOUNDARY[name]} for name in present
+    }
     if drawn.is_cut:
         entries |= {name: {**patch, "mfc": colour} for name, colour in _colours(drawn).items()}
     if not scene.tacton.trajectory.is_static:
@@ -276,7 +278,10 @@ def _entries(drawn: MeshedBody, scene: Scene) -> dict[str, dict[str, Any]]:
 
 def _colours(drawn: MeshedBody) -> dict[str, str]:
     """Return the colour of each material that the section shows, from the surface downwards."""
-    names = [*drawn.coat, *(drawn.names[k] for k in np.unique(drawn.region).tolist())]
+    names = [
+        *(name for name, _ in drawn.coat),
+        *(drawn.names[k] for k in np.unique(drawn.region).tolist()),
+    ]
     return {name: REGIONS[k % len(REGIONS)] for k, name in enumerate(dict.fromkeys(names))}
 
 
@@ -315,20 +320,11 @@ def _render(
             _add_sections(plotter, drawn, pixel)
         _add_marks(plotter, drawn, scene, pixel)
         foot, tip = _arrow(drawn)
-        arrow = pv.Arrow(start=foot, direction=tip - foot, scale="auto", shaft_radius=0.03, tip_radius=0.09)
+        arrow = pv.Arrow(
+            start=foot, direction=tip - foot, scale="auto", shaft_radius=0.03, tip_radius=0.09
+        )
         _add(plotter, arrow, color=ORANGE, **LIT)
-        middle = np.array(view.extent).reshape(2, 2).mean(axis=1) @ view.axes[:2]
-        plotter.camera.focal_point = tuple(middle)
-        plotter.camera.position = tuple(middle + 10 * _side(drawn) * view.axes[2])
-        plotter.camera.up = tuple(view.axes[1])
-        plotter.camera.parallel_projection = True
-        plotter.camera.parallel_scale = (view.extent[3] - view.extent[2]) / 2
-        plotter.renderer.reset_camera_clipping_range()
-        for light in (
-            pv.Light(light_type="headlight", color="white", intensity=0.55),
-            pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5),
-        ):
-            plotter.add_light(light, only_active=True)
+        view.apply(plotter)
         return np.asarray(plotter.screenshot(None, return_img=True))
     finally:
         plotter.close()
@@ -346,9 +342,6 @@ def _add_skin(plotter: Any, drawn: MeshedBody, facets: Ints, names: Sequence[str
     skin["shade"] = (255 * np.clip(shades, 0, 1)).astype(np.uint8)
     skin = skin.clean().compute_normals(feature_angle=SHARP, split_vertices=True)
     _add(plotter, _opened(skin, drawn), scalars="shade", rgb=True, smooth_shading=True, **LIT)
-
-
-LIT: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.6}
 
 
 def _add(plotter: Any, mesh: Any, **options: Any) -> None:
@@ -372,37 +365,35 @@ def _add_sections(plotter: Any, drawn: MeshedBody, pixel: float) -> None:
     colours, far = _colours(drawn), 1e4
     body = pv.UnstructuredGrid({pv.CellType.QUADRATIC_TETRA: drawn.tets}, drawn.points)
     body["region"] = drawn.region
-    top = split(drawn.top)
-    for axis, bounds in (("y", [0, far, -far, far, -far, far]), ("x", [-far, far, -far, 0, -far, far])):
-        section = body.slice(normal=axis, origin=(0, 0, 0)).clip_box(bounds, invert=False)
+    top, low, high = split(drawn.top), drawn.points.min(axis=0), drawn.points.max(axis=0)
+    # Normal of each section, the box it lies in, the place where it ends, and its front.
+    for normal, box, end, front in (
+        ("y", [0, far, -far, far, -far, far], (high[0], 0.0), (0.0, -FRONT)),
+        ("x", [-far, far, -far, 0, -far, far], (0.0, low[1]), (FRONT, 0.0)),
+    ):
+        section = body.slice(normal=normal, origin=(0, 0, 0))
+        if not section.n_cells:  # a body beside the origin
+            continue
+        section = section.clip_box(box, invert=False)
         for k in np.unique(section["region"]).tolist():
             part = section.extract_cells(section["region"] == k)
             _add(plotter, part, color=colours[drawn.names[int(k)]], lighting=False)
         _add(plotter, section.extract_all_edges(), color=EDGE, line_width=pixel, opacity=0.25)
-        along = 0 if axis == "y" else 1
-        reach = np.linspace(0.0, 1.0, 241) * (
-            drawn.points[:, 0].max() if along == 0 else drawn.points[:, 1].min()
-        )
-        places = np.zeros((len(reach), 2))
-        places[:, along] = 0.9999 * reach
+        places = np.linspace(0.0, 0.9999, SECTION)[:, None] * end
         height = on_triangles(drawn.points, top, places)(drawn.points[:, 2])
-        places, height = places[np.isfinite(height)], height[np.isfinite(height)]
-        towards = np.array([0.0, -0.05]) if along == 0 else np.array([0.05, 0.0])
-        start = 0.0
-        for name, thickness in drawn.coat.items():
-            rows = [np.column_stack([places + towards, height - start - part])
-                    for part in (0.0, thickness)]  # fmt: skip
-            grid = np.stack(rows, axis=1)
-            ribbon = pv.StructuredGrid(grid[..., 0], grid[..., 1], grid[..., 2])
+        places, height = places[np.isfinite(height)] + front, height[np.isfinite(height)]
+        for name, thickness in drawn.coat:
+            rows = [np.column_stack([places, height - part]) for part in (0.0, thickness)]
+            ribbon = pv.StructuredGrid(*np.moveaxis(np.stack(rows, axis=1)[..., None], 2, 0))
             _add(plotter, ribbon, color=colours[name], lighting=False)
-            start += thickness
+            height = height - thickness
 
 
 def _add_marks(plotter: Any, drawn: MeshedBody, scene: Scene, pixel: float) -> None:
     """Draw path, focus and probes on the surface."""
     import pyvista as pv
 
-    top, lift = split(drawn.top), LIFT * _side(drawn) / 100
+    top, lift = split(drawn.top), LIFT * _side(drawn)
 
     def placed(places: Floats) -> Floats:
         height = on_triangles(drawn.points, top, 0.9999 * places)(drawn.points[:, 2])

@@ -28,7 +28,7 @@ SNAPSHOT, SIDE, ALONE = 2.7, 3.85, 5.0  # inch: of a snapshot, of a map with its
 KERNEL, THRESHOLD = "#ff9e4a", "#ff2fd0"  # lines: the kernel's -20 dB, the detection threshold
 MEASURED_EDGE = COLOURS["measured"]
 CONE = 0.025  # m, length of the lines at the Mach angle
-FINER = 4  # grid of a drawn map over that of its values
+FEWEST_PIXELS = 250  # along the longer side of a map, which is interpolated to be smooth
 OUTLINES = {"white": "0.4", "black": "white"}  # of lines, to be seen on every background
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 CAPTION = (
@@ -79,7 +79,7 @@ def surfaces_figure(
     kernel = next((each for each in surfaces.values() if each.quantity is PRESSURE), None)
     alone = len(surfaces) == 1
     figure, axes = panels(len(surfaces), style, ALONE if alone else SIDE)
-    entries: dict[str, Any] = {"path of the focus": {**_outlined("white"), "ls": "dotted"}}
+    entries: dict[str, Any] = _path_entry(scene, "white")
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
         quantity, power = surface.quantity, _power_of_ten(surface.unit_rms)
         shown = np.maximum(_finer(surface.unit_rms), 0.0) / 10.0**power
@@ -118,9 +118,15 @@ def surfaces_figure(
 
 def draw_path(ax: Axes, scene: Scene, ink: str) -> None:
     """Draw the path of the focus, or the place where it rests."""
-    path = 1e3 * path_points(scene)
-    style = {"ls": "dotted", "lw": 1.4} if len(path) > 1 else {"ls": "none", "marker": "+"}
-    ax.plot(*path.T, **_outlined(ink), **style)
+    (style,) = _path_entry(scene, ink).values()
+    ax.plot(*(1e3 * path_points(scene).T), **style)
+
+
+def _path_entry(scene: Scene, ink: str) -> dict[str, dict[str, Any]]:
+    """Return the properties of the path of a focus, or of a focus at rest, by its name."""
+    if scene.tacton.trajectory.is_static:
+        return {"focus, at rest": {**_outlined(ink), "ls": "none", "marker": "+"}}
+    return {"path of the focus": {**_outlined(ink), "ls": "dotted", "lw": 1.4}}
 
 
 def _outlined(ink: str) -> dict[str, Any]:
@@ -138,7 +144,7 @@ def _power_of_ten(values: Floats) -> int:
 
 
 def _finer(field: Floats) -> Floats:
-    """Return a field (ny, nx) on a grid `FINER` times as fine; nan where it is nearer to nan."""
+    """Return a field (ny, nx) on a finer grid, for smooth maps; nan where it is nearer to nan."""
     from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
@@ -147,7 +153,8 @@ def _finer(field: Floats) -> Floats:
         return field
     missing = np.isnan(field)
     nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
-    fine = tuple(np.linspace(0, n - 1, FINER * (n - 1) + 1) for n in field.shape)
+    times = -(-FEWEST_PIXELS // max(field.shape))
+    fine = tuple(np.linspace(0, n - 1, times * (n - 1) + 1) for n in field.shape)
     values = RectBivariateSpline(rows, columns, field[tuple(nearest)])(*fine)
     off = RegularGridInterpolator((rows, columns), gaussian_filter(missing.astype(float), 1.0))
     values[off(tuple(np.meshgrid(*fine, indexing="ij"))) > 0.5] = np.nan
@@ -161,8 +168,8 @@ def _draw_border(
     if not np.nanmin(field) < level < np.nanmax(field):
         return False
     fine = _finer(field)
-    x, y = (1e3 * np.linspace(*line[[0, -1]], n)
-            for line, n in zip((surface.x, surface.y), fine.shape[::-1], strict=True))  # fmt: skip
+    x = 1e3 * np.linspace(surface.x[0], surface.x[-1], fine.shape[1])
+    y = 1e3 * np.linspace(surface.y[0], surface.y[-1], fine.shape[0])
     lines = ax.contour(x, y, fine, [level], colors=colour, linewidths=1.4, linestyles=dashes)
     lines.set_path_effects(_outlined(colour).get("path_effects", []))
     return True
@@ -191,9 +198,7 @@ def interpolation(view: View, places: Floats) -> Callable[[Floats], Floats]:
     return on_triangles(view.points[view.surface], view.triangles, places)
 
 
-def on_triangles(
-    points: Floats, triangles: Ints, places: Floats
-) -> Callable[[Floats], Floats]:
+def on_triangles(points: Floats, triangles: Ints, places: Floats) -> Callable[[Floats], Floats]:
     """Return the function that interpolates values (s,) at points (s, 3), on triangles (k, 3), at
     places (..., 2); nan beside the triangles.
     """
@@ -234,7 +239,8 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
                 extent=extent, origin="lower",
             )  # fmt: skip
             ax.autoscale(False)
-            draw_path(ax, view.scene, "black")
+            if not view.scene.tacton.trajectory.is_static:
+                draw_path(ax, view.scene, "black")
             _draw_focus(ax, view, float(view.times[frame]))
         name = f"{label(view.column)}\n±1 = {view.quantity.text(view.peak)}\ny, mm"
         row[0].set_ylabel(name, color=ink_colour(view.column))
@@ -264,9 +270,10 @@ def _mach_angle(view: View) -> float | None:
 
 def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, Any]]:
     entries: dict[str, dict[str, Any]] = {
-        "path": {**_outlined("black"), "ls": "dotted"},
         "focus": {**_outlined("black"), "marker": "o", "mfc": "none", "ls": "none"},
     }
+    if not views[0].scene.tacton.trajectory.is_static:
+        entries |= _path_entry(views[0].scene, "black")
     angles = [f"{label(view.column)} {np.rad2deg(angle):.0f}°"
               for view in views if (angle := _mach_angle(view))]  # fmt: skip
     if angles:
@@ -280,7 +287,7 @@ def _draw_focus(ax: Axes, view: View, time: float) -> None:
     """Draw the focus and, if it is faster than the surface wave, the Mach angle behind it."""
     path = view.scene.tacton.trajectory
     focus = path.position(time)
-    ax.plot(*1e3 * focus, marker="o", mfc="none", ms=6, mew=1.2, **_outlined("black"))
+    ax.plot(*(1e3 * focus), marker="o", mfc="none", ms=6, mew=1.2, **_outlined("black"))
     if (angle := _mach_angle(view)) is None:
         return
     ahead = path.position(time + 1e-5) - focus
@@ -291,4 +298,4 @@ def _draw_focus(ax: Axes, view: View, time: float) -> None:
         line = focus + reach[:, None] * [np.cos(back), np.sin(back)]
         on_body = np.isfinite(interpolation(view, line)(view.points[view.surface, 2]))
         end = len(line) if on_body.all() else int(on_body.argmin())
-        ax.plot(*1e3 * line[:end].T, lw=1.2, **_outlined("black"))
+        ax.plot(*(1e3 * line[:end].T), lw=1.2, **_outlined("black"))

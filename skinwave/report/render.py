@@ -28,12 +28,11 @@ from skinwave.typing import Floats, Ints
 
 Image = NDArray[np.uint8]
 Interpolation = Callable[[Floats], Floats]  # values (s,) of a surface -> values at some places
-# Direction of the camera, its focal point, and half of the visible height, in widths of a body.
-CAMERAS = {
-    "tilted": ((-0.45, -1.0, 0.85), (0.0, -0.03, -0.05), 0.62),
-    "front": ((0.0, -1.0, 0.45), (0.0, 0.2, 0.0), 0.5),
-    "top": ((0.0, 0.0, 1.0), (0.0, 0.06, 0.0), 0.72),
-}
+CAMERAS = {  # directions from the body to the camera
+    "tilted": (-0.45, -1.0, 0.85), "front": (0.0, -1.0, 0.45), "top": (0.0, 0.0, 1.0),
+}  # fmt: skip
+# Part of a panel that bodies fill, along its width and height, and the middle of that height.
+FILLED, MIDDLE = (0.92, 0.74), 0.44
 LARGEST_DRAWN = 0.06  # of the body's width, for the largest motion
 BARS = (10.0, 5.0, 2.0, 1.0)  # mm, lengths of scale bars
 FONT = findfont("DejaVu Sans")  # of all figures
@@ -42,14 +41,15 @@ WIDTH = 1600  # pixels, of a picture that is not for print
 PAGE, LETTERS = 7.0, 8.0  # inch, width of a page; points, size of letters at that width
 LEAST_LETTER = 11.0  # pixels, in films
 SHARP = 35.0  # degrees, of edges that are not smoothed
-LIFT = 0.4  # mm, of path, probes and focus above the surface
+LIFT = 0.004  # of the body's size: height of path, probes and focus above the surface
 PATH, FOCUS, PROBE = "black", "black", "#ffd000"  # colours of marks
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Panel:
     """Geometry of one view: triangles of its surface and their nodes (n,), marks that move with it,
-    the focus, the interpolation to the focus in every frame, and the exaggeration.
+    the focus, the interpolation to the focus in every frame, the exaggeration, and the height in mm
+    of marks above the surface.
     """
 
     view: View
@@ -59,6 +59,7 @@ class Panel:
     focus: Any
     under_focus: Interpolation
     factor: float
+    lift: float
 
 
 def exaggeration(view: View) -> float:
@@ -143,8 +144,13 @@ def stage(
             if not (cut or len(view.tets)):  # the rim of the surface at rest
                 low, high = view.places.min(axis=0), view.places.max(axis=0)
                 rim = np.where([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], high, low)
-                plotter.add_mesh(_line(rim, cut=False), color="#9a9a9a", line_width=1)
-            _set_camera(plotter, camera, panels)
+                plotter.add_mesh(_line(rim, 0.0), color="#9a9a9a", line_width=1)
+        shown = [each for panel in panels
+                 for each in (1e3 * panel.view.points[panel.nodes], _bar(panel.view))]  # fmt: skip
+        fitting = Projection.of(CAMERAS[camera], np.vstack(shown), width / height, FILLED, MIDDLE)
+        for k in range(len(views)):
+            plotter.subplot(0, k)
+            fitting.apply(plotter)
         plotter.subplot(0, 0)
 
         def show(frame: int) -> Image:
@@ -211,17 +217,24 @@ def make_panel(view: View, cut: bool = False) -> Panel:
     path, probes = path_points(view.scene), view.scene.probe_points
     reach = np.abs(view.places).max(axis=0)
     probes = probes[(np.abs(probes) <= reach).all(axis=1) & ~(cut & (probes[:, 1] < 0))]
-    riding = [(pv.PolyData(_lift(probes)), probes)] if len(probes) else []
-    riding += [(_line(path, cut), path)] if len(path) > 1 else []
+    lift = LIFT * size_of(view)
+    riding = [(pv.PolyData(_lift(probes, lift)), probes)] if len(probes) else []
+    riding += [(_line(path, lift, cut), path)] if len(path) > 1 else []
     if cut:  # the upper edge of the section
         edge = np.column_stack([np.linspace(-reach[0], reach[0], 121), np.zeros(121)])
-        riding.append((_line(edge, cut), edge))
+        riding.append((_line(edge, lift, cut), edge))
     marks = [(mesh, interpolation(view, 0.9999 * places)) for mesh, places in riding]
     under = interpolation(view, 0.9999 * view.scene.tacton.trajectory.position(view.times))
     return Panel(
         view=view, skin=skin, nodes=nodes, marks=tuple(marks),
-        focus=pv.PolyData(_lift(path[:1])), under_focus=under, factor=exaggeration(view),
+        focus=pv.PolyData(_lift(path[:1], lift)), under_focus=under, factor=exaggeration(view),
+        lift=lift,
     )  # fmt: skip
+
+
+def size_of(view: View) -> float:
+    """Return the longer side of a surface in mm."""
+    return 1e3 * float(np.ptp(view.places, axis=0).max())
 
 
 def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
@@ -235,7 +248,7 @@ def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
     return nodes, triangles.reshape(-1, 3)
 
 
-def _line(path: Floats, cut: bool) -> Any:
+def _line(path: Floats, lift: float, cut: bool = False) -> Any:
     """Return a line through places; with `cut`, only its part with y >= 0."""
     import pyvista as pv
 
@@ -243,11 +256,11 @@ def _line(path: Floats, cut: bool) -> Any:
     if cut:
         pairs = pairs[(path[pairs, 1] >= 0).all(axis=1)]
     cells = np.hstack([np.full((len(pairs), 1), 2), pairs]).ravel()
-    return pv.PolyData(_lift(path), lines=cells)
+    return pv.PolyData(_lift(path, lift), lines=cells)
 
 
-def _lift(places: Floats) -> Floats:
-    return np.column_stack([1e3 * places, np.full(len(places), LIFT)])
+def _lift(places: Floats, lift: float) -> Floats:
+    return np.column_stack([1e3 * places, np.full(len(places), lift)])
 
 
 def _draw_panel(
@@ -281,10 +294,9 @@ def _add_scale_bar(plotter: Any, view: View, style: Style, letter: float) -> Non
     """Draw a scale bar along x, in front of the body."""
     import pyvista as pv
 
-    left, front, bottom = 1e3 * view.points.min(axis=0)
-    length = bar_length(1e3 * float(np.ptp(view.places, axis=0).max()))
-    ends = np.array([[left, front - length / 2, bottom], [left + length, front - length / 2, bottom]])
+    ends = _bar(view)
     plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=letter / 4)
+    length = float(np.ptp(ends[:, 0]))
     plotter.add_point_labels(
         ends[1:] + [length / 4, 0.0, 0.0], [f"{length:g} mm"],
         font_size=round(letter), font_file=FONT,
@@ -293,28 +305,71 @@ def _add_scale_bar(plotter: Any, view: View, style: Style, letter: float) -> Non
     )  # fmt: skip
 
 
+def _bar(view: View) -> Floats:
+    """Return the ends (2, 3) of a scale bar in mm."""
+    left, front, bottom = 1e3 * view.points.min(axis=0)
+    length = bar_length(size_of(view))
+    front -= length / 2
+    return np.array([[left, front, bottom], [left + length, front, bottom]])
+
+
 def bar_length(side: float) -> float:
     """Return the length in mm of the scale bar of a body with a side in mm."""
     return next(length for length in BARS if length <= side / 4 or length == BARS[-1])
 
 
-def _set_camera(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
-    """Set one camera and light for all panels, at the distance that the widest body needs."""
-    import pyvista as pv
+@dataclass(frozen=True, kw_only=True)
+class Projection:
+    """Parallel projection: directions (3, 3) to the right, upwards and to the camera, and the
+    middle (2,) and half sides (2,) of the visible rectangle in mm.
+    """
 
-    direction, aim, height = CAMERAS[camera]
-    widest = max(1e3 * float(np.ptp(panel.view.places, axis=0).max()) for panel in panels)
-    plotter.camera.focal_point = tuple(widest * np.array(aim))
-    plotter.camera.position = tuple(widest * (np.array(aim) + 4 * np.array(direction)))
-    plotter.camera.up = (0.0, 1.0, 0.0) if camera == "top" else (0.0, 0.0, 1.0)
-    for light in (
-        pv.Light(light_type="headlight", color="white", intensity=0.6),
-        pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5),
-    ):
-        plotter.add_light(light, only_active=True)
-    plotter.camera.parallel_projection = True
-    plotter.camera.parallel_scale = height * widest
-    plotter.renderer.reset_camera_clipping_range()
+    axes: Floats
+    middle: Floats
+    half: Floats
+
+    @classmethod
+    def of(
+        cls, direction: Sequence[float], points: Floats, aspect: float,
+        filled: tuple[float, float] = (0.92, 0.92), height: float = 0.5,
+    ) -> "Projection":  # fmt: skip
+        """Return the projection from a direction that shows points (n, 3), as large as fits.
+
+        They fill a part of width and height of a picture with this aspect ratio, about the middle
+        of its width and a relative `height`.
+        """
+        towards = np.array(direction) / np.linalg.norm(direction)
+        right = np.cross([0.0, 0.0, 1.0], towards) if towards[:2].any() else np.array([1.0, 0, 0])
+        right = right / np.linalg.norm(right)
+        axes = np.array([right, np.cross(towards, right), towards])
+        flat = points @ axes[:2].T
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        across, up = (high - low) / filled / 2
+        half = np.array([aspect, 1.0]) * max(across / aspect, up)
+        return cls(
+            axes=axes, middle=(low + high) / 2 + [0.0, half[1] * (1 - 2 * height)], half=half
+        )
+
+    def at(self, point: Floats) -> Floats:
+        """Return the place (2,) of a point (3,) in the visible plane, in mm."""
+        return np.asarray(self.axes[:2] @ point)
+
+    def apply(self, plotter: Any) -> None:
+        """Set the camera and lights of a plotter's panel."""
+        import pyvista as pv
+
+        aim, camera = self.middle @ self.axes[:2], plotter.camera
+        camera.focal_point = tuple(aim)
+        camera.position = tuple(aim + 10 * self.half.max() * self.axes[2])
+        camera.up = tuple(self.axes[1])
+        camera.parallel_projection = True
+        camera.parallel_scale = self.half[1]
+        for light in (
+            pv.Light(light_type="headlight", color="white", intensity=0.6),
+            pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5),
+        ):
+            plotter.add_light(light, only_active=True)
+        plotter.renderer.reset_camera_clipping_range()
 
 
 def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
@@ -336,7 +391,9 @@ def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
         height = drawn[view.surface, 2]
         for mark, interpolate in panel.marks:
             raised = np.array(mark.points)
-            raised[:, 2] = interpolate(height) + LIFT
+            raised[:, 2] = interpolate(height) + panel.lift
             mark.points = raised
-        focus = _lift(view.scene.tacton.trajectory.position(view.times[frame : frame + 1]))
+        focus = _lift(
+            view.scene.tacton.trajectory.position(view.times[frame : frame + 1]), panel.lift
+        )
         panel.focus.points = focus + [0.0, 0.0, panel.under_focus(height)[frame]]

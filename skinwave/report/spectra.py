@@ -182,7 +182,7 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     for ax, run in zip(axes, runs, strict=False):
         _draw_levels(ax, run, probe, width)
     if runs:
-        axes[0].set_ylim(*_level_limits(axes))
+        axes[0].set_ylim(*_level_limits([*axes]))
     entries: dict[str, dict[str, Any]] = {}
     if any(run.is_skin for run in runs):
         entries["threshold for a focal spot"] = CURVE

@@ -181,9 +181,7 @@ def page_of(
     return Report(title, verdict, parts, efforts_of(runs), PICTURES, failed)
 
 
-def _body_parts(
-    runs: Sequence[Run], gallery: Gallery, failures: dict[str, str]
-) -> list[Part]:
+def _body_parts(runs: Sequence[Run], gallery: Gallery, failures: dict[str, str]) -> list[Part]:
     """Return the pictures of bodies that were computed by elements, or the reason why not."""
     meshed = [run for run in runs if named(run.model).default_size]
     if meshed and not renderer().is_available:
@@ -323,8 +321,11 @@ def four_numbers(first: FirstScreen) -> Table:
          (ms and f"{ms} ms" for ms in map(_millisecond, effects))),
     ]  # fmt: skip
     name = f"{first.kernel.tacton}, same load"
-    columns = [name, "point kernel", *(label(each.column) for each in effects)]
-    return Table(columns, [[heading, kernel, *values] for heading, kernel, values in rows])
+    bodies = [label(each.column) for each in effects]
+    if not first.maps:  # no map, and so no value of the kernel
+        return Table([name, *bodies], [[heading, *values] for heading, _, values in rows])
+    table = [[heading, kernel, *values] for heading, kernel, values in rows]
+    return Table([name, "point kernel", *bodies], table)
 
 
 def _deflection_text(run: Run) -> str:
@@ -435,4 +436,6 @@ def _effects_table(effects: Mapping[str, Mapping[str, Propagation]]) -> list[Par
         "phase delay of the strongest component, ms", "strongest component, kernel",
         "strongest component, body", "highest sensation level",
     ]  # fmt: skip
-    return [ABOUT_MAPS, Table(columns, rows)]
+    known = [k for k in range(len(columns)) if any(row[k] is not None for row in rows)]
+    rows = [[row[k] for k in known] for row in rows]
+    return [ABOUT_MAPS, Table([columns[k] for k in known], rows)]
