@@ -41,7 +41,9 @@ HIGHEST_SHOWN = 650.0  # Hz
 LOWEST_SHOWN = 8.0  # Hz: the mean and its leakage lie below
 SETTLE = 0.25  # part of the response in which the transient decays
 LOWEST_LEVEL = -30.0  # dB re threshold: weaker lines are not drawn
-BELOW, MOST_RATIO = 1.5, 1e4  # of the lowest line shown; the largest value over the smallest
+# Least ratio of the lowest line to the lowest decade, largest ratio of all values, and the end of
+# the axis over that decade, whose label then does not touch that of the other axis.
+BELOW, MOST_RATIO, CORNER = 1.5, 1e4, 0.6
 NAME_ROWS, MOST_NAMED = 3, 12  # of names above a panel of sensation levels
 CURVE: dict[str, Any] = {"color": "0.45", "lw": 1.5}
 THRESHOLD_BAND: dict[str, Any] = {"color": "0.5", "alpha": 0.25}
@@ -249,7 +251,8 @@ def _level_limits(axes: Sequence[Axes]) -> tuple[float, float]:
     shown = shown[shown > 0]
     low, high = (shown.min(), shown.max()) if len(shown) else (0.1, 1.0)
     low = max(low, high / MOST_RATIO)
-    return 10.0 ** np.floor(np.log10(low / BELOW)), 10.0 ** np.ceil(np.log10(high))
+    bottom = CORNER * 10.0 ** np.floor(np.log10(low / BELOW))
+    return bottom, 10.0 ** np.ceil(np.log10(high))
 
 
 @with_style
