@@ -19,7 +19,7 @@ from skinwave.results.run import Run
 
 P = ParamSpec("P")
 REPORT = STYLES["report"]
-LETTER, GAP = 0.55, 0.7  # width of a letter of a line's name, and of a gap, over the font size
+LETTER, GAP = 0.55, 0.5  # width of a letter of a line's name, and of a gap, over the font size
 SUBSCRIPT, LEAST_SUBSCRIPT = 0.7, 7.0  # size over that of its letter; least size in points
 ROW = 1.45  # height of a row of names over the font size
 LINE_STYLE: dict[str, Any] = {"color": "0.6", "lw": 0.8, "ls": ":", "zorder": 0}
@@ -115,7 +115,10 @@ def name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int = 1
     size, occupied = name_size(), [list[tuple[float, float]]() for _ in range(rows)]
     to_axes = ax.transScale + ax.transLimits
     for name, frequency in lines.items():
-        half = size * (LETTER * len(name.replace("_", "")) + GAP) / 2
+        subscripts = sum(map(len, re.findall(r"_(\w+)", name)))
+        signs = len(re.findall(r"[-+]", name))  # which have a space on both sides
+        letters = len(name.replace("_", "")) - (1 - SUBSCRIPT) * subscripts + signs
+        half = size * (LETTER * letters + GAP) / 2
         middle = width * to_axes.transform((frequency, 1.0))[0]
         low, high = middle - half, middle + half
         free = [

@@ -44,6 +44,7 @@ LOWEST_LEVEL = -30.0  # dB re threshold: weaker lines are not drawn
 # Least ratio of the lowest line to the lowest decade, largest ratio of all values, and the end of
 # the axis over that decade, whose label then does not touch that of the other axis.
 BELOW, MOST_RATIO, CORNER = 1.5, 1e4, 0.6
+SMALL_NUMBER = 1e-4  # at least: written without an exponent
 NAME_ROWS, MOST_NAMED = 3, 12  # of names above a panel of sensation levels
 CURVE: dict[str, Any] = {"color": "0.45", "lw": 1.5}
 THRESHOLD_BAND: dict[str, Any] = {"color": "0.5", "alpha": 0.25}
@@ -184,7 +185,10 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     for ax, run in zip(axes, runs, strict=False):
         _draw_levels(ax, run, probe, width)
     if runs:
-        axes[0].set_ylim(*_level_limits([*axes]))
+        low, high = _level_limits([*axes])
+        axes[0].set_ylim(low, high)
+        if low > SMALL_NUMBER:  # without small exponents
+            axes[0].yaxis.set_major_formatter("{x:g}")
     entries: dict[str, dict[str, Any]] = {}
     if any(run.is_skin for run in runs):
         entries["threshold for a focal spot"] = CURVE
