@@ -171,8 +171,12 @@ def _surface_frame(
     owner, barycentric = facets_below(mesh.points[nodes], points[:, :2])
     if (outside := owner < 0).any():
         x_mm, y_mm = 1e3 * points[outside][0, :2]
+        surface = 1e3 * mesh.points[np.unique(nodes), :2]
+        (left, front), (right, back) = surface.min(axis=0), surface.max(axis=0)
         raise ValueError(
-            f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside"
+            f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside the "
+            f"outline, which reaches x = {left:.3g} to {right:.3g} mm, y = {front:.3g} to "
+            f"{back:.3g} mm"
         )
     N = shape_functions(barycentric, nodes.shape[1])
     if patch:

@@ -42,7 +42,10 @@ def in_tissue_layers(
     """
     region = mesh.region
     rest = rest or (lambda m: support(body, m, facet_normals(m, boundary_facets(m.tets))))
-    mesh, materials = in_layers(mesh, meshed_strata(body, h), depths(mesh))
+    strata = meshed_strata(body, h)
+    # Depths take seconds, and a single stratum needs none.
+    deep = depths(mesh) if len(strata) > 1 else np.zeros(len(mesh.tets))
+    mesh, materials = in_layers(mesh, strata, deep)
     mesh, materials = in_regions(body, mesh, materials, region, body.file or f"the {body.kind}")
     return Discretised(mesh=mesh, materials=materials, coat=coat(body, h), support=rest)
 
@@ -63,7 +66,7 @@ def support(
     below = [] if "bottom" in mesh.facets else [(body.base, -outward[:, 2])]
     stiffness, absorbed = np.zeros((2, len(outward)))
     for end, cosine in [*below, *ends]:
-        share = _share(cosine)
+        share = supported_share(cosine)
         if end == "clamped":
             stiffness += _shear_stiffness(body, mesh) * share / (1 - share + 1 / STIFFEST)
         elif end == "elastic":
@@ -73,8 +76,10 @@ def support(
     return fem.Support(facets=boundary_facets(mesh.tets), stiffness=stiffness, absorbed=absorbed)
 
 
-def _share(cosine: Floats) -> Floats:
-    """Smooth step from 0 where a surface is free to 1 where it is fully supported."""
+def supported_share(cosine: Floats) -> Floats:
+    """Return the share, from 0 to 1, of a support where its direction and the outward normal of the
+    surface have a cosine.
+    """
     t = np.clip((cosine - BEGINS) / (ENTIRE - BEGINS), 0.0, 1.0)
     return np.asarray(t * t * (3 - 2 * t))
 

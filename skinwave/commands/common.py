@@ -67,7 +67,7 @@ def add_width(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--width", type=float, metavar="INCH",
         help="width of every figure for print, such as 3.5 or 7 for a journal; letters are 8 "
-        "points, subscripts 5.6 points",
+        "points, names of lines 10 points, and their subscripts 7 points",
     )  # fmt: skip
 
 

@@ -40,13 +40,14 @@ ENOUGH = 0.1  # of the uncertainty: a smaller numerical error gains nothing
 @dataclass(frozen=True, kw_only=True)
 class ErrorBudget:
     """Relative errors of the worst probe's waveform: `numerical`, and those due to one standard
-    deviation of numbers of the `material` and of the `device`; nan if not computed, 0 if no spread
-    is known.
+    deviation of numbers of the `material` and of the `device`; 0 if no spread is known, nan if not
+    computed, for a `reason`.
     """
 
     numerical: float
     material: float
     device: float
+    reason: str = ""
 
     @property
     def words(self) -> str:
@@ -60,7 +61,7 @@ class ErrorBudget:
     def spreads(self) -> str:
         """The uncertainties from the material and the device in a few words."""
         return ", ".join(
-            f"{name} {_percent(value) if value else '(spread unknown)'}"
+            f"{name} {self._percent(value) if value else '(spread unknown)'}"
             for name, value in (("material", self.material), ("device", self.device))
         )
 
@@ -71,9 +72,10 @@ class ErrorBudget:
         name = max(known, key=lambda each: known[each] if isfinite(known[each]) else -1.0)
         return (name, known[name]) if isfinite(known[name]) else ("", 0.0)
 
-
-def _percent(value: float) -> str:
-    return change_text(value) if isfinite(value) else "not computed"
+    def _percent(self, value: float) -> str:
+        if isfinite(value):
+            return change_text(value)
+        return f"not computed ({self.reason})" if self.reason else "not computed"
 
 
 def error_budget(scene: Scene, numerical: float = nan) -> ErrorBudget:
@@ -81,51 +83,59 @@ def error_budget(scene: Scene, numerical: float = nan) -> ErrorBudget:
     spreads = spreads_of(scene)
     of_material = [s for s in spreads if s.part == "material"]
     of_device = [s for s in spreads if s.part != "material"]
-    return ErrorBudget(
-        numerical=numerical, material=_uncertainty(scene, of_material),
-        device=_uncertainty(scene, of_device),
-    )  # fmt: skip
+    (material, why), (device, too) = (
+        _uncertainty(scene, each) for each in (of_material, of_device)
+    )
+    return ErrorBudget(numerical=numerical, material=material, device=device, reason=why or too)
 
 
-def _uncertainty(scene: Scene, spreads: Sequence[Spread]) -> float:
-    """Return the uncertainty of the worst probe's waveform; nan if it is not computed."""
+def _uncertainty(scene: Scene, spreads: Sequence[Spread]) -> tuple[float, str]:
+    """Return the uncertainty of the worst probe's waveform, or nan and why it is not computed."""
     changes: list[Floats] = []
     for spread in spreads:
         low, high = spread.distribution.quantile(spread.value, SIGMA)
         if spread.key == PRESSURE:
             changes.append(np.full(len(scene.probes), (high - low) / (2 * spread.value)))
-        elif (change := _change(scene, spread.key, (float(low), float(high)))) is not None:
-            changes.append(change)
-        else:
-            return nan
-    return float(np.sqrt(np.sum(np.square(changes), axis=0)).max()) if changes else 0.0
+            continue
+        change = _change(scene, spread.key, (float(low), float(high)))
+        if isinstance(change, str):
+            return nan, change
+        changes.append(change)
+    total = float(np.sqrt(np.sum(np.square(changes), axis=0)).max()) if changes else 0.0
+    return total, ""
 
 
-def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | None:
-    """Return half the relative change (p,) of the motion between two values, or None."""
+def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | str:
+    """Return half the relative change (p,) of the motion between two values, or why not."""
     lines_of = _closed_form(scene)
-    if lines_of is None or (lines_of is _lines_of_layers and key.startswith(NOT_IN_LAYERS)):
-        return None
+    if isinstance(lines_of, str):
+        return lines_of
+    if lines_of is _lines_of_layers and key.startswith(NOT_IN_LAYERS):
+        return f"flat layers do not depend on {key}"
     try:
         lines = [lines_of(scene), *(lines_of(with_values(scene, {key: end})) for end in ends)]
     except (ValueError, ArithmeticError):  # a number out of range, or almost no loss
-        return None
+        return f"there is no response at one standard deviation of {key}"
     (f, centre), (f_low, low), (f_high, high) = lines
     if not (np.array_equal(f, f_low) and np.array_equal(f, f_high)):
-        return None
+        return f"lines of the load depend on {key}"
     return relative_changes((high - low) / 2, centre)
 
 
-def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]] | None:
-    """Return the function that computes a scene's steady lines, or None."""
+def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]] | str:
+    """Return the function that computes a scene's steady lines, or why there is none."""
     body = scene.body
-    lossy = any(solid.has_loss for _, solid in body.strata)
-    if not lossy or scene.tacton.trajectory.shape == "recorded":
-        return None
+    if not any(solid.has_loss for _, solid in body.strata):
+        return "the body has no loss"
+    if scene.tacton.trajectory.shape == "recorded":
+        return "the path is recorded"
     if body.of_kind.is_plate:
-        return _lines_of_plate if takes(MODES, scene) else None
-    flat = body.of_kind.dispersion is not None
-    return _lines_of_layers if flat and scene.reading.is_plain and scene.load.is_normal else None
+        return _lines_of_plate if takes(MODES, scene) else "the sheet has no modes of a flat plate"
+    if body.of_kind.dispersion is None:
+        return f"a {body.kind} has no flat layers; skinwave run --samples samples its elements"
+    if not (scene.reading.is_plain and scene.load.is_normal):
+        return "only for the displacement under a normal load"
+    return _lines_of_layers
 
 
 def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
@@ -149,8 +159,8 @@ def mesh_row(scene: Scene, h: float | None, error: float) -> PlanRow:
     if not largest:
         return PlanRow(what="uncertainty", value=budget.spreads, reason="no spread is known")
     reason = (
-        f"numerical errors below a tenth of that of the {name}, {_percent(ENOUGH * largest)}, do "
-        "not matter"
+        f"numerical errors below a tenth of that of the {name}, {change_text(ENOUGH * largest)}, "
+        "do not matter"
     )
     if h is not None and error > 0:
         coarsest = float(element_sizes(scene.body)[0])

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.patheffects import withStroke
 
 from fem.load_and_probe import facets_below
 from simple_model import MovingPressure
@@ -20,13 +21,16 @@ from skinwave.results.propagation import NEAR, OUTSIDE, mach_angle
 from skinwave.results.surface import SurfaceField
 from skinwave.results.views import View, path_points
 from skinwave.scene.scene import Scene
-from skinwave.typing import Floats
+from skinwave.typing import Floats, Ints
 
 PIXELS = 201  # along a side of a snapshot
 SNAPSHOT, SIDE, ALONE = 2.7, 3.85, 5.0  # inch: of a snapshot, of a map with its bar, of one map
 KERNEL, THRESHOLD = "#ff9e4a", "#ff2fd0"  # lines: the kernel's -20 dB, the detection threshold
 MEASURED_EDGE = COLOURS["measured"]
-CONE = 25.0  # mm, length of the lines at the Mach angle
+CONE = 0.025  # m, length of the lines at the Mach angle
+FEWEST_PIXELS = 250  # along the longer side of a map, which is interpolated to be smooth
+OUTLINES = {"white": "0.4", "black": "white"}  # of lines, to be seen on every background
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 CAPTION = (
     "Outside the dashed line the point kernel is below a tenth of its largest value; the body "
     "moves there because waves propagate."
@@ -75,29 +79,35 @@ def surfaces_figure(
     kernel = next((each for each in surfaces.values() if each.quantity is PRESSURE), None)
     alone = len(surfaces) == 1
     figure, axes = panels(len(surfaces), style, ALONE if alone else SIDE)
-    entries: dict[str, Any] = {"path of the focus": {"color": "0.6", "ls": "dotted"}}
+    entries: dict[str, Any] = _path_entry(scene, "white")
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
-        extent = tuple(1e3 * np.array([*surface.x[[0, -1]], *surface.y[[0, -1]]]))
-        image = ax.imshow(surface.unit_rms, cmap=SEQUENTIAL, vmin=0, origin="lower", extent=extent)
+        quantity, power = surface.quantity, _power_of_ten(surface.unit_rms)
+        shown = np.maximum(_finer(surface.unit_rms), 0.0) / 10.0**power
+        (left, right), (low, high) = 1e3 * surface.x[[0, -1]], 1e3 * surface.y[[0, -1]]
+        beyond = (right - left) / (shown.shape[1] - 1) / 2  # half a pixel
+        image = ax.imshow(
+            shown, cmap=SEQUENTIAL, vmin=0, origin="lower",
+            extent=(left - beyond, right + beyond, low - beyond, high + beyond),
+        )  # fmt: skip
+        ax.set(xlim=(left, right), ylim=(low, high))
         borders = [(surface, NEAR, "white", "solid", f"{NEAR:g} dB")]
         if kernel is not None:
             borders.insert(0, (kernel, OUTSIDE, KERNEL, "dashed", f"kernel's {OUTSIDE:g} dB"))
         for field, drop, colour, dashes, name in borders:
             level = np.nanmax(field.rms) * 10 ** (drop / 20)
             if _draw_border(ax, field, field.rms, level, colour, dashes):
-                entries[name] = {"color": colour.replace("white", "0.6"), "ls": dashes}
+                entries[name] = {**_outlined(colour), "ls": dashes}
         level_map = surface.level
         if level_map is not None and _draw_border(ax, surface, level_map, 0.0, THRESHOLD, "solid"):
             entries["detection threshold"] = {"color": THRESHOLD, "ls": "solid"}
         draw_path(ax, scene, "white")
-        extend = _draw_measured(ax, surface, image, measured) if measured else "neither"
+        extend = _draw_measured(ax, surface, image, measured, power) if measured else "neither"
         note = f" ({surface.note})" * bool(surface.note and not alone)
         ax.set_title(label(column) + note, fontsize="medium")
-        quantity = surface.quantity
         symbol = "" if quantity in (DISPLACEMENT, PRESSURE) else f" ${quantity.symbol}$,"
-        title = f"RMS about the mean,{symbol} {quantity.shown}"
-        bar = figure.colorbar(image, ax=ax, label=title, extend=extend)
-        bar.ax.ticklabel_format(axis="y", scilimits=(-3, 4))  # short labels
+        factor = f"10{str(power).translate(RAISED)} " if power else ""
+        title = f"RMS about the mean,{symbol} {factor}{quantity.shown}"
+        figure.colorbar(image, ax=ax, label=title, extend=extend)
     if measured:
         entries["measured, in the map's colours"] = {
             "ls": "", "marker": "s", "mfc": "0.8", "mec": MEASURED_EDGE, "ms": 8
@@ -108,9 +118,47 @@ def surfaces_figure(
 
 def draw_path(ax: Axes, scene: Scene, ink: str) -> None:
     """Draw the path of the focus, or the place where it rests."""
-    path = 1e3 * path_points(scene)
-    style = {"ls": "dotted", "lw": 1.2} if len(path) > 1 else {"ls": "none", "marker": "+"}
-    ax.plot(*path.T, color=ink, **style)
+    (style,) = _path_entry(scene, ink).values()
+    ax.plot(*(1e3 * path_points(scene).T), **style)
+
+
+def _path_entry(scene: Scene, ink: str) -> dict[str, dict[str, Any]]:
+    """Return the properties of the path of a focus, or of a focus at rest, by its name."""
+    if scene.tacton.trajectory.is_static:
+        return {"focus, at rest": {**_outlined(ink), "ls": "none", "marker": "+"}}
+    return {"path of the focus": {**_outlined(ink), "ls": "dotted", "lw": 1.4}}
+
+
+def _outlined(ink: str) -> dict[str, Any]:
+    """Return the properties of a line that is visible on every background."""
+    if ink not in OUTLINES:
+        return {"color": ink}
+    return {"color": ink, "path_effects": [withStroke(linewidth=2.3, foreground=OUTLINES[ink])]}
+
+
+def _power_of_ten(values: Floats) -> int:
+    """Return the exponent of the unit of a colour bar, 0 if its numbers are short without."""
+    largest = float(np.nanmax(values))
+    power = int(np.floor(np.log10(largest))) if largest else 0
+    return power if not -3 <= power < 4 else 0
+
+
+def _finer(field: Floats) -> Floats:
+    """Return a field (ny, nx) on a finer grid, for smooth maps; nan where it is nearer to nan."""
+    from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
+    from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+    rows, columns = (np.arange(n, dtype=np.float64) for n in field.shape)
+    if min(field.shape) < 4:
+        return field
+    missing = np.isnan(field)
+    nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
+    times = -(-FEWEST_PIXELS // max(field.shape))
+    fine = tuple(np.linspace(0, n - 1, times * (n - 1) + 1) for n in field.shape)
+    values = RectBivariateSpline(rows, columns, field[tuple(nearest)])(*fine)
+    off = RegularGridInterpolator((rows, columns), gaussian_filter(missing.astype(float), 1.0))
+    values[off(tuple(np.meshgrid(*fine, indexing="ij"))) > 0.5] = np.nan
+    return np.asarray(values)
 
 
 def _draw_border(
@@ -119,13 +167,16 @@ def _draw_border(
     """Draw the contour of a field (ny, nx) at a level; return whether it exists."""
     if not np.nanmin(field) < level < np.nanmax(field):
         return False
-    x, y = 1e3 * surface.x, 1e3 * surface.y
-    ax.contour(x, y, field, [level], colors=colour, linewidths=1.3, linestyles=dashes)
+    fine = _finer(field)
+    x = 1e3 * np.linspace(surface.x[0], surface.x[-1], fine.shape[1])
+    y = 1e3 * np.linspace(surface.y[0], surface.y[-1], fine.shape[0])
+    lines = ax.contour(x, y, fine, [level], colors=colour, linewidths=1.4, linestyles=dashes)
+    lines.set_path_effects(_outlined(colour).get("path_effects", []))
     return True
 
 
 def _draw_measured(
-    ax: Axes, surface: SurfaceField, image: AxesImage, measured: MeasuredPlaces
+    ax: Axes, surface: SurfaceField, image: AxesImage, measured: MeasuredPlaces, power: int
 ) -> Literal["neither", "max"]:
     """Draw measured places on a map; return the `extend` option of its colour bar."""
     low, high = ((surface.x[end], surface.y[end]) for end in (0, -1))
@@ -136,7 +187,7 @@ def _draw_measured(
     if surface.quantity is not DISPLACEMENT:
         ax.scatter(x, y, **style, facecolors="none")
         return "neither"
-    rms = DISPLACEMENT.per_unit * measured.rms[within]
+    rms = DISPLACEMENT.per_unit * measured.rms[within] / 10.0**power
     least, most = image.get_clim()
     ax.scatter(x, y, **style, c=rms, cmap=image.cmap, vmin=least, vmax=most)
     return "max" if rms.max(initial=0.0) > most else "neither"
@@ -144,10 +195,16 @@ def _draw_measured(
 
 def interpolation(view: View, places: Floats) -> Callable[[Floats], Floats]:
     """Return the function of surface values (s,) that interpolates them at places (..., 2)."""
-    facets = view.points[view.surface][view.triangles]
-    owner, weights = facets_below(facets, places.reshape(-1, 2))
+    return on_triangles(view.points[view.surface], view.triangles, places)
+
+
+def on_triangles(points: Floats, triangles: Ints, places: Floats) -> Callable[[Floats], Floats]:
+    """Return the function that interpolates values (s,) at points (s, 3), on triangles (k, 3), at
+    places (..., 2); nan beside the triangles.
+    """
+    owner, weights = facets_below(points[triangles], places.reshape(-1, 2))
     on = (owner >= 0).reshape(places.shape[:-1])
-    nodes, weights = view.triangles[owner[owner >= 0]], weights[owner >= 0]
+    nodes, weights = triangles[owner[owner >= 0]], weights[owner >= 0]
 
     def interpolate(values: Floats) -> Floats:
         at = np.full(on.shape, np.nan)
@@ -181,7 +238,9 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
                 sampled(view.inward[frame] / view.peak), cmap=SIGNED, vmin=-1, vmax=1,
                 extent=extent, origin="lower",
             )  # fmt: skip
-            draw_path(ax, view.scene, "black")
+            ax.autoscale(False)
+            if not view.scene.tacton.trajectory.is_static:
+                draw_path(ax, view.scene, "black")
             _draw_focus(ax, view, float(view.times[frame]))
         name = f"{label(view.column)}\n±1 = {view.quantity.text(view.peak)}\ny, mm"
         row[0].set_ylabel(name, color=ink_colour(view.column))
@@ -211,28 +270,32 @@ def _mach_angle(view: View) -> float | None:
 
 def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, Any]]:
     entries: dict[str, dict[str, Any]] = {
-        "path": {"color": style.ink, "ls": "dotted"},
-        "focus": {"color": style.ink, "marker": "o", "mfc": "none", "ls": "none"},
+        "focus": {**_outlined("black"), "marker": "o", "mfc": "none", "ls": "none"},
     }
+    if not views[0].scene.tacton.trajectory.is_static:
+        entries |= _path_entry(views[0].scene, "black")
     angles = [f"{label(view.column)} {np.rad2deg(angle):.0f}°"
               for view in views if (angle := _mach_angle(view))]  # fmt: skip
     if angles:
         between = "\n" if style.is_narrow else " "
         title = f"Mach angle on a straight path:{between}{', '.join(angles)}"
-        entries[title] = {"color": style.ink}
+        entries[title] = _outlined("black")
     return entries
 
 
 def _draw_focus(ax: Axes, view: View, time: float) -> None:
     """Draw the focus and, if it is faster than the surface wave, the Mach angle behind it."""
     path = view.scene.tacton.trajectory
-    x, y = 1e3 * path.position(time)
-    ax.plot(x, y, marker="o", mfc="none", mec="black", ms=6, mew=1.2)
+    focus = path.position(time)
+    ax.plot(*(1e3 * focus), marker="o", mfc="none", ms=6, mew=1.2, **_outlined("black"))
     if (angle := _mach_angle(view)) is None:
         return
-    ahead = path.position(time + 1e-5) - path.position(time)
+    ahead = path.position(time + 1e-5) - focus
     heading = np.arctan2(ahead[1], ahead[0])
+    reach = np.linspace(0, CONE, PIXELS)
     for side in (-1, 1):
         back = heading + np.pi + side * angle
-        end = x + CONE * np.cos(back), y + CONE * np.sin(back)
-        ax.plot([x, end[0]], [y, end[1]], color="black", lw=1.2)
+        line = focus + reach[:, None] * [np.cos(back), np.sin(back)]
+        on_body = np.isfinite(interpolation(view, line)(view.points[view.surface, 2]))
+        end = len(line) if on_body.all() else int(on_body.argmin())
+        ax.plot(*(1e3 * line[:end].T), lw=1.2, **_outlined("black"))

@@ -9,8 +9,13 @@ from dataclasses import dataclass
 from math import floor, log10
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from meshes.tetmesh import boundary_facets
@@ -23,24 +28,28 @@ from skinwave.typing import Floats, Ints
 
 Image = NDArray[np.uint8]
 Interpolation = Callable[[Floats], Floats]  # values (s,) of a surface -> values at some places
-# Direction of the camera, its focal point, and half of the visible height, in widths of a body.
-CAMERAS = {
-    "tilted": ((-0.45, -1.0, 0.85), (0.0, -0.03, -0.05), 0.62),
-    "front": ((0.0, -1.0, 0.45), (0.0, 0.2, 0.0), 0.5),
-    "top": ((0.0, 0.0, 1.0), (0.0, 0.06, 0.0), 0.72),
-}
+CAMERAS = {  # directions from the body to the camera
+    "tilted": (-0.45, -1.0, 0.85), "front": (0.0, -1.0, 0.45), "top": (0.0, 0.0, 1.0),
+}  # fmt: skip
+# Part of a panel that bodies fill, along its width and height, and the middle of that height.
+FILLED, MIDDLE = (0.92, 0.74), 0.44
 LARGEST_DRAWN = 0.06  # of the body's width, for the largest motion
-BAR = 10.0  # mm, length of the scale bar
-FONT, VTK_FONT_FILE = findfont("DejaVu Sans"), 4  # the font of all figures; the kind of font
+BARS = (10.0, 5.0, 2.0, 1.0)  # mm, lengths of scale bars
+FONT = findfont("DejaVu Sans")  # of all figures
 COLUMN = 0.26  # width of the colour bar over the height of the picture
-WIDTH = 1600  # pixels, of a picture at least
-LIFT = 0.4  # mm, of path, probes and focus above the surface
+WIDTH = 1600  # pixels, of a picture that is not for print
+PAGE, LETTERS = 7.0, 8.0  # inch, width of a page; points, size of letters at that width
+LEAST_LETTER = 11.0  # pixels, in films
+SHARP = 35.0  # degrees, of edges that are not smoothed
+LIFT = 0.004  # of the body's size: height of path, probes and focus above the surface
+PATH, FOCUS, PROBE = "black", "black", "#ffd000"  # colours of marks
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Panel:
     """Geometry of one view: triangles of its surface and their nodes (n,), marks that move with it,
-    the focus, the interpolation to the focus in every frame, and the exaggeration.
+    the focus, the interpolation to the focus in every frame, the exaggeration, and the height in mm
+    of marks above the surface.
     """
 
     view: View
@@ -50,6 +59,7 @@ class Panel:
     focus: Any
     under_focus: Interpolation
     factor: float
+    lift: float
 
 
 def exaggeration(view: View) -> float:
@@ -76,24 +86,40 @@ def picture(
 ) -> Image:  # fmt: skip
     """Return a picture (height, width, 3) of views side by side, from one of `CAMERAS`.
 
-    With `cut`, the half of each body nearer to the camera is omitted.
+    With `cut`, the half of each body nearer to the camera is omitted. In print, one view has the
+    width of a column, and several have that of a page.
     """
     width, height = style.panel
-    larger = max(1.0, WIDTH / (len(views) * width + COLUMN * height))
+    inch = style.size(PAGE if len(views) > 1 else PAGE / 2, PAGE)[0] if style.columns else PAGE
+    larger = pixels(style, inch) / (len(views) * width + COLUMN * height)
     panel = round(larger * width), round(larger * height)
-    with stage(views, style, camera=camera, cut=cut, panel=panel) as show:
+    with stage(views, style, camera=camera, cut=cut, panel=panel, inch=inch) as show:
         return show(frame)
+
+
+def pixels(style: Style, inch: float) -> int:
+    """Return the width in pixels of a picture that is `inch` wide in print."""
+    return round(inch * style.dpi) if style.columns else WIDTH
+
+
+def raster(figure: Figure, dpi: float) -> Image:
+    """Return the picture (height, width, 3) of a figure."""
+    figure.dpi = dpi
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())[..., :3]
 
 
 @contextmanager
 def stage(
     views: Sequence[View], style: Style, *, camera: str = "tilted", cut: bool = False,
-    panel: tuple[int, int] | None = None,
+    panel: tuple[int, int] | None = None, inch: float = PAGE,
 ) -> Iterator[Callable[[int], Image]]:  # fmt: skip
     """Context manager that builds a plotter once and yields a function from a frame to a picture.
 
     All views share a colour scale: motion into the body relative to the largest of each model or,
     for a single view, in its unit; other quantities in their unit, from 0 if they have no sign.
+    Letters have `LETTERS` points in a picture that is `inch` wide.
     """
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
@@ -101,50 +127,67 @@ def stage(
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # warnings about displays
     width, height = panel or style.panel
     column = round(COLUMN * height)
-    share = [width / column] * len(views) + [1.0]
+    letter = max(LETTERS / 72 * (width * len(views) + column) / inch, LEAST_LETTER)
     plotter = pv.Plotter(
-        off_screen=True, lighting="none", shape=(1, len(views) + 1), border=False,
-        col_weights=share, window_size=(width * len(views) + column, height),
+        off_screen=True, lighting="none", shape=(1, len(views)), border=False,
+        window_size=(width * len(views), height),
     )  # fmt: skip
     try:
         plotter.set_background(style.paper)
-        small = height / 432 * 11
         limits, title = _colour_scale(views)
+        bar = _colour_bar(limits, title, style, letter, (column, height))
         panels = []
         for k, view in enumerate(views):
             plotter.subplot(0, k)
             panels.append(make_panel(view, cut))
-            actor = _draw_panel(plotter, panels[-1], style, limits, small, lit=camera != "top")
-            if not cut:  # the rim of the surface at rest
+            _draw_panel(plotter, panels[-1], style, limits, letter, lit=camera != "top")
+            if not (cut or len(view.tets)):  # the rim of the surface at rest
                 low, high = view.places.min(axis=0), view.places.max(axis=0)
                 rim = np.where([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], high, low)
-                plotter.add_mesh(_line(rim, cut=False), color="#9a9a9a", line_width=1)
-            _set_camera(plotter, camera, panels)
-        plotter.subplot(0, len(views))
-        bar = plotter.add_scalar_bar(
-            title, mapper=actor.mapper, vertical=True, color=style.ink, n_labels=5,
-            label_font_size=int(1.2 * small), title_font_size=int(1.2 * small), fmt="%.3g",
-            position_x=0.2, position_y=0.12, width=0.55, height=0.7,
-        )  # fmt: skip
-        for text in (bar.GetLabelTextProperty(), bar.GetTitleTextProperty()):
-            text.SetFontFile(FONT)
-            text.SetFontFamily(VTK_FONT_FILE)
+                plotter.add_mesh(_line(rim, 0.0), color="#9a9a9a", line_width=1)
+        shown = [each for panel in panels
+                 for each in (1e3 * panel.view.points[panel.nodes], _bar(panel.view))]  # fmt: skip
+        fitting = Projection.of(CAMERAS[camera], np.vstack(shown), width / height, FILLED, MIDDLE)
+        for k in range(len(views)):
+            plotter.subplot(0, k)
+            fitting.apply(plotter)
         plotter.subplot(0, 0)
 
         def show(frame: int) -> Image:
             set_frame(panels, frame, limits[1])
             plotter.subplot(0, 0)
             stamp = f"t = {1e3 * views[0].times[frame]:.2f} ms"
-            plotter.add_text(
-                stamp, position=(0.66, 0.03), viewport=True, font_size=0.85 * small, font_file=FONT,
-                color=style.ink, name="time", render=False,
-            )  # fmt: skip
+            _write(plotter, stamp, (0.66, 0.03), letter, style.ink, name="time", render=False)
             plotter.render()  # otherwise the screenshot is the previous picture
-            return np.asarray(plotter.screenshot(None, return_img=True, scale=style.oversampling))
+            return np.hstack([plotter.screenshot(None, return_img=True), bar])
 
         yield show
     finally:
         plotter.close()
+
+
+def _write(
+    plotter: Any, text: str, place: tuple[float, float], letter: float, ink: str, **options: Any
+) -> None:
+    """Write text with letters of so many pixels at a place of the current panel."""
+    plotter.add_text(
+        text, position=place, viewport=True, font_size=letter / 2, font_file=FONT, color=ink,
+        **options,
+    )  # fmt: skip
+
+
+def _colour_bar(
+    limits: tuple[float, float], title: str, style: Style, letter: float, size: tuple[int, int]
+) -> Image:
+    """Return the picture of a colour bar of a size in pixels."""
+    dpi = 72 * letter / style.font
+    with mpl.rc_context(style.rc):
+        figure = Figure(figsize=(size[0] / dpi, size[1] / dpi))
+        ax = figure.add_axes((0.1, 0.12, 0.18, 0.66))
+        shades = mpl.cm.ScalarMappable(Normalize(*limits), SIGNED if limits[0] else SEQUENTIAL)
+        figure.colorbar(shades, cax=ax, ticks=MaxNLocator(6, steps=[1, 2, 5, 10]))
+        figure.text(0.1, 0.8, title, va="bottom", ha="left")
+        return raster(figure, dpi)
 
 
 def _colour_scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
@@ -153,12 +196,12 @@ def _colour_scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
     if shades:
         shown = quantity(shades[0].quantity)
         most = shown.per_unit * max(float(np.abs(shade.values).max()) for shade in shades) or 1.0
-        return (-most if shown.invariant is None else 0.0, most), f"{shown.shown}\n"
+        return (-most if shown.invariant is None else 0.0, most), shown.shown
     if len(views) > 1:
-        return (-1.0, 1.0), "over the\nlargest\n"
+        return (-1.0, 1.0), "over the\nlargest"
     view = views[0]
     most = view.quantity.per_unit * view.peak
-    return (-most, most), f"{view.quantity.shown}\n"
+    return (-most, most), view.quantity.shown
 
 
 def make_panel(view: View, cut: bool = False) -> Panel:
@@ -167,21 +210,31 @@ def make_panel(view: View, cut: bool = False) -> Panel:
 
     nodes, triangles = outer_surface(view, cut)
     skin = pv.PolyData.from_regular_faces(1e3 * view.points[nodes], triangles)
+    skin["node"] = nodes
+    skin = skin.compute_normals(feature_angle=SHARP, split_vertices=True)  # edges stay sharp
+    nodes = np.asarray(skin["node"])
     skin["motion"] = np.zeros(len(nodes), np.float32)
     path, probes = path_points(view.scene), view.scene.probe_points
     reach = np.abs(view.places).max(axis=0)
     probes = probes[(np.abs(probes) <= reach).all(axis=1) & ~(cut & (probes[:, 1] < 0))]
-    riding = [(pv.PolyData(_lift(probes)), probes)] if len(probes) else []
-    riding += [(_line(path, cut), path)] if len(path) > 1 else []
+    lift = LIFT * size_of(view)
+    riding = [(pv.PolyData(_lift(probes, lift)), probes)] if len(probes) else []
+    riding += [(_line(path, lift, cut), path)] if len(path) > 1 else []
     if cut:  # the upper edge of the section
         edge = np.column_stack([np.linspace(-reach[0], reach[0], 121), np.zeros(121)])
-        riding.append((_line(edge, cut), edge))
+        riding.append((_line(edge, lift, cut), edge))
     marks = [(mesh, interpolation(view, 0.9999 * places)) for mesh, places in riding]
     under = interpolation(view, 0.9999 * view.scene.tacton.trajectory.position(view.times))
     return Panel(
         view=view, skin=skin, nodes=nodes, marks=tuple(marks),
-        focus=pv.PolyData(_lift(path[:1])), under_focus=under, factor=exaggeration(view),
+        focus=pv.PolyData(_lift(path[:1], lift)), under_focus=under, factor=exaggeration(view),
+        lift=lift,
     )  # fmt: skip
+
+
+def size_of(view: View) -> float:
+    """Return the longer side of a surface in mm."""
+    return 1e3 * float(np.ptp(view.places, axis=0).max())
 
 
 def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
@@ -195,7 +248,7 @@ def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
     return nodes, triangles.reshape(-1, 3)
 
 
-def _line(path: Floats, cut: bool) -> Any:
+def _line(path: Floats, lift: float, cut: bool = False) -> Any:
     """Return a line through places; with `cut`, only its part with y >= 0."""
     import pyvista as pv
 
@@ -203,73 +256,120 @@ def _line(path: Floats, cut: bool) -> Any:
     if cut:
         pairs = pairs[(path[pairs, 1] >= 0).all(axis=1)]
     cells = np.hstack([np.full((len(pairs), 1), 2), pairs]).ravel()
-    return pv.PolyData(_lift(path), lines=cells)
+    return pv.PolyData(_lift(path, lift), lines=cells)
 
 
-def _lift(places: Floats) -> Floats:
-    return np.column_stack([1e3 * places, np.full(len(places), LIFT)])
+def _lift(places: Floats, lift: float) -> Floats:
+    return np.column_stack([1e3 * places, np.full(len(places), lift)])
 
 
 def _draw_panel(
-    plotter: Any, panel: Panel, style: Style, limits: tuple[float, float], small: float, *,
+    plotter: Any, panel: Panel, style: Style, limits: tuple[float, float], letter: float, *,
     lit: bool,
-) -> Any:  # fmt: skip
-    """Draw a panel; return the actor of its surface."""
+) -> None:  # fmt: skip
+    """Draw a panel."""
     view = panel.view
-    actor = plotter.add_mesh(
+    plotter.add_mesh(
         panel.skin, scalars="motion", cmap=SIGNED if limits[0] else SEQUENTIAL, clim=limits,
-        show_scalar_bar=False,
+        show_scalar_bar=False, smooth_shading=True,
         ambient=0.3 if lit else 0.0, diffuse=0.8 if lit else 1.0, lighting=lit,
     )  # fmt: skip
-    balls, pixel = {"render_points_as_spheres": True}, small / 11  # of a panel of 432 pixels
+    balls, pixel = {"render_points_as_spheres": True}, letter / 16
     for mark, _ in panel.marks:
         if mark.n_lines:
-            plotter.add_mesh(mark, color="black", line_width=2 * pixel)
+            plotter.add_mesh(mark, color=PATH, line_width=2 * pixel)
         else:
-            plotter.add_mesh(mark, color="#ffd000", point_size=10 * pixel, **balls)
-    plotter.add_mesh(panel.focus, color="black", point_size=15 * pixel, **balls)
+            plotter.add_mesh(mark, color=PROBE, point_size=10 * pixel, **balls)
+    plotter.add_mesh(panel.focus, color=FOCUS, point_size=15 * pixel, **balls)
     own = colour(view.column)
-    plotter.add_text(label(view.column), position=(0.04, 0.92), viewport=True,
-                     font_size=1.1 * small, font_file=FONT,
-                     color=style.ink if own == "#000000" else own)  # fmt: skip
-    plotter.add_text(scale_text(view), position=(0.04, 0.86), viewport=True,
-                     font_size=0.75 * small, font_file=FONT, color=style.ink)  # fmt: skip
-    _add_scale_bar(plotter, view, style, small)
-    return actor
+    ink = style.ink if own == "#000000" else own
+    _write(plotter, label(view.column), (0.04, 0.92), 1.25 * letter, ink)
+    text = scale_text(view).replace("; ", ";\n").replace("times, ", "times,\n")
+    rows = (1.4 + 1.15 * text.count("\n")) * letter / plotter.window_size[1]
+    _write(plotter, text, (0.04, 0.92 - rows), letter, style.ink)
+    _add_scale_bar(plotter, view, style, letter)
 
 
-def _add_scale_bar(plotter: Any, view: View, style: Style, small: float) -> None:
+def _add_scale_bar(plotter: Any, view: View, style: Style, letter: float) -> None:
     """Draw a scale bar along x, in front of the body."""
     import pyvista as pv
 
-    left, front, bottom = 1e3 * view.points.min(axis=0)
-    ends = np.array([[left, front - 5, bottom], [left + BAR, front - 5, bottom]])
-    plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=4 * small / 11)
+    ends = _bar(view)
+    plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=letter / 4)
+    length = float(np.ptp(ends[:, 0]))
     plotter.add_point_labels(
-        ends.mean(axis=0)[None] - [0.0, 3.0, 0.0], [f"{BAR:g} mm"], font_size=int(1.2 * small),
-        font_file=FONT,
+        ends[1:] + [length / 4, 0.0, 0.0], [f"{length:g} mm"],
+        font_size=round(letter), font_file=FONT,
         text_color=style.ink, shape=None, show_points=False, always_visible=True,
-        justification_horizontal="center", justification_vertical="top",
+        justification_horizontal="left", justification_vertical="center",
     )  # fmt: skip
 
 
-def _set_camera(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
-    """Set one camera and light for all panels, at the distance that the widest body needs."""
-    import pyvista as pv
+def _bar(view: View) -> Floats:
+    """Return the ends (2, 3) of a scale bar in mm."""
+    left, front, bottom = 1e3 * view.points.min(axis=0)
+    length = bar_length(size_of(view))
+    front -= length / 2
+    return np.array([[left, front, bottom], [left + length, front, bottom]])
 
-    direction, aim, height = CAMERAS[camera]
-    widest = max(1e3 * float(np.ptp(panel.view.places, axis=0).max()) for panel in panels)
-    plotter.camera.focal_point = tuple(widest * np.array(aim))
-    plotter.camera.position = tuple(widest * (np.array(aim) + 4 * np.array(direction)))
-    plotter.camera.up = (0.0, 1.0, 0.0) if camera == "top" else (0.0, 0.0, 1.0)
-    for light in (
-        pv.Light(light_type="headlight", color="white", intensity=0.6),
-        pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5),
-    ):
-        plotter.add_light(light, only_active=True)
-    plotter.camera.parallel_projection = True
-    plotter.camera.parallel_scale = height * widest
-    plotter.renderer.reset_camera_clipping_range()
+
+def bar_length(side: float) -> float:
+    """Return the length in mm of the scale bar of a body with a side in mm."""
+    return next(length for length in BARS if length <= side / 4 or length == BARS[-1])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Projection:
+    """Parallel projection: directions (3, 3) to the right, upwards and to the camera, and the
+    middle (2,) and half sides (2,) of the visible rectangle in mm.
+    """
+
+    axes: Floats
+    middle: Floats
+    half: Floats
+
+    @classmethod
+    def of(
+        cls, direction: Sequence[float], points: Floats, aspect: float,
+        filled: tuple[float, float] = (0.92, 0.92), height: float = 0.5,
+    ) -> "Projection":  # fmt: skip
+        """Return the projection from a direction that shows points (n, 3), as large as fits.
+
+        They fill a part of width and height of a picture with this aspect ratio, about the middle
+        of its width and a relative `height`.
+        """
+        towards = np.array(direction) / np.linalg.norm(direction)
+        right = np.cross([0.0, 0.0, 1.0], towards) if towards[:2].any() else np.array([1.0, 0, 0])
+        right = right / np.linalg.norm(right)
+        axes = np.array([right, np.cross(towards, right), towards])
+        flat = points @ axes[:2].T
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        across, up = (high - low) / filled / 2
+        half = np.array([aspect, 1.0]) * max(across / aspect, up)
+        return cls(
+            axes=axes, middle=(low + high) / 2 + [0.0, half[1] * (1 - 2 * height)], half=half
+        )
+
+    def at(self, point: Floats) -> Floats:
+        """Return the place (2,) of a point (3,) in the visible plane, in mm."""
+        return np.asarray(self.axes[:2] @ point)
+
+    def apply(self, plotter: Any) -> None:
+        """Set the camera and lights of a plotter's panel."""
+        import pyvista as pv
+
+        aim, camera = self.middle @ self.axes[:2], plotter.camera
+        camera.focal_point = tuple(aim)
+        camera.position = tuple(aim + 10 * self.half.max() * self.axes[2])
+        camera.up = tuple(self.axes[1])
+        camera.parallel_projection = True
+        camera.parallel_scale = self.half[1]
+        for light in (
+            pv.Light(light_type="headlight", color="white", intensity=0.6),
+            pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5),
+        ):
+            plotter.add_light(light, only_active=True)
+        plotter.renderer.reset_camera_clipping_range()
 
 
 def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
@@ -285,10 +385,15 @@ def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
             values = view.shade.values[frame, np.searchsorted(view.shade.nodes, panel.nodes)]
             values = np.float32(quantity(view.shade.quantity).per_unit) * values
         panel.skin["motion"] = values
+        panel.skin.compute_normals(
+            cell_normals=False, split_vertices=False, consistent_normals=False, inplace=True
+        )
         height = drawn[view.surface, 2]
         for mark, interpolate in panel.marks:
             raised = np.array(mark.points)
-            raised[:, 2] = interpolate(height) + LIFT
+            raised[:, 2] = interpolate(height) + panel.lift
             mark.points = raised
-        focus = _lift(view.scene.tacton.trajectory.position(view.times[frame : frame + 1]))
+        focus = _lift(
+            view.scene.tacton.trajectory.position(view.times[frame : frame + 1]), panel.lift
+        )
         panel.focus.points = focus + [0.0, 0.0, panel.under_focus(height)[frame]]

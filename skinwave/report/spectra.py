@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from simple_model import spectrum, threshold
-from simple_model.drawing import small
 from simple_model.quantities import DISPLACEMENT, Quantity
 from simple_model.threshold import BAND, HIGHEST, LOWEST
 from skinwave.report.figures import (
@@ -19,6 +18,7 @@ from skinwave.report.figures import (
     legend,
     line_symbol,
     name_lines,
+    name_size,
     run_label,
     with_style,
 )
@@ -41,6 +41,10 @@ HIGHEST_SHOWN = 650.0  # Hz
 LOWEST_SHOWN = 8.0  # Hz: the mean and its leakage lie below
 SETTLE = 0.25  # part of the response in which the transient decays
 LOWEST_LEVEL = -30.0  # dB re threshold: weaker lines are not drawn
+# Least ratio of the lowest line to the lowest decade, largest ratio of all values, and the end of
+# the axis over that decade, whose label then does not touch that of the other axis.
+BELOW, MOST_RATIO, CORNER = 1.5, 1e4, 0.6
+SMALL_NUMBER = 1e-4  # at least: written without an exponent
 NAME_ROWS, MOST_NAMED = 3, 12  # of names above a panel of sensation levels
 CURVE: dict[str, Any] = {"color": "0.45", "lw": 1.5}
 THRESHOLD_BAND: dict[str, Any] = {"color": "0.5", "alpha": 0.25}
@@ -74,7 +78,7 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     if narrow:
         axes[0, 1].set_yticks(np.arange(FLOOR, 1, 40))
     else:
-        pad, frequencies = 4 + ROW * small(), runs[0].frequencies
+        pad, frequencies = 4 + ROW * name_size(), runs[0].frequencies
         lines = {name: frequencies[name] for name in MARKED if name in frequencies}
         name_lines(axes[0, 1], lines, 72 * axes[0, 1].get_position().width * size[0])
     axes[0, 1].set_title(titles[1], fontsize="medium", pad=pad)
@@ -180,6 +184,11 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     width = 72 * size[0] / shape[1] - 8 * style.font  # points
     for ax, run in zip(axes, runs, strict=False):
         _draw_levels(ax, run, probe, width)
+    if runs:
+        low, high = _level_limits([*axes])
+        axes[0].set_ylim(low, high)
+        if low > SMALL_NUMBER:  # without small exponents
+            axes[0].yaxis.set_major_formatter("{x:g}")
     entries: dict[str, dict[str, Any]] = {}
     if any(run.is_skin for run in runs):
         entries["threshold for a focal spot"] = CURVE
@@ -232,13 +241,22 @@ def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
     for peak in run.unnamed:
         ax.plot(peak.frequency, per_unit * peak.amplitudes[probe], ls="none", mfc="none", **style)
     ax.set(xscale="log", yscale="log", xlim=(LOWEST, HIGHEST), xlabel="frequency, Hz")
-    if run.response.record is DISPLACEMENT:
-        ax.set_ylim(2e-3, 3e3)
     ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
-    ax.set_title(run_label(run), pad=4 + NAME_ROWS * ROW * small())
+    ax.set_title(run_label(run), pad=4 + NAME_ROWS * ROW * name_size())
     ax.grid(alpha=0.25)
     named = {name: table.frequencies[name] for name in names[:MOST_NAMED]}
     name_lines(ax, named, width, NAME_ROWS)
+
+
+def _level_limits(axes: Sequence[Axes]) -> tuple[float, float]:
+    """Return the limits in decades of everything that panels of sensation levels show."""
+    shown = np.concatenate([np.asarray(line.get_ydata(), float) for ax in axes for line in ax.lines
+                            if line.get_transform() == ax.transData])  # fmt: skip
+    shown = shown[shown > 0]
+    low, high = (shown.min(), shown.max()) if len(shown) else (0.1, 1.0)
+    low = max(low, high / MOST_RATIO)
+    bottom = CORNER * 10.0 ** np.floor(np.log10(low / BELOW))
+    return bottom, 10.0 ** np.ceil(np.log10(high))
 
 
 @with_style
@@ -283,7 +301,9 @@ def lines_figure(
                 right.plot(at[mask], phase[mask], mfc=face, **markers)
         left.set_ylim(bottom=0)
         name = list(lines)[k]
-        left.set_ylabel(f"{line_symbol(name)}\n{lines[name]:.1f} Hz", fontweight="bold")
+        left.set_ylabel(
+            f"{line_symbol(name)}\n{lines[name]:.1f} Hz", fontweight="bold", fontsize=name_size()
+        )
     axes[0, 0].set_title(f"amplitude, {quantity.shown}", fontsize="medium")
     axes[0, 1].set_title("phase of the model minus measured phase, degrees", fontsize="medium")
     for ax in axes[-1]:

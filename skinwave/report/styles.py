@@ -18,8 +18,8 @@ ONE_COLUMN = 6.5  # inch, with letters of 10 points: wider figures span two colu
 @dataclass(frozen=True, kw_only=True)
 class Style:
     """Style of pictures: colours of paper and ink, font size in points, dots per inch, widths in
-    inches of one and of two columns of a printed page, size in pixels of a model in three
-    dimensions, and the factor of resolution for three-dimensional pictures.
+    inches of one and of two columns of a printed page, and size in pixels of a model in three
+    dimensions on a screen.
     """
 
     paper: str = "#ffffff"
@@ -28,7 +28,6 @@ class Style:
     dpi: int = 110
     columns: tuple[float, float] | None = None
     panel: tuple[int, int] = (480, 432)
-    oversampling: int = 1
 
     @property
     def zoom(self) -> float:
@@ -64,7 +63,7 @@ class Style:
 STYLES = {
     "report": Style(),
     "talk": Style(paper="#15181c", ink="#f2f2f2", font=14.0, dpi=107, panel=(640, 576)),
-    "print": Style(ink="#000000", font=8.0, dpi=300, columns=(3.5, 7.0), oversampling=2),
+    "print": Style(ink="#000000", font=8.0, dpi=300, columns=(3.5, 7.0)),
 }
 
 

@@ -48,7 +48,7 @@ PATHS = "write a Windows path in single quotes, 'C:\\hand.stl', or with /, \"C:/
 
 
 def read(path: str | Path) -> Scene:
-    """Read the scene in a TOML file.
+    """Read the scene in a TOML file; a scene without a name has that of its file.
 
     Raises a ValueError if the file cannot be read or is not a scene.
 
@@ -59,7 +59,7 @@ def read(path: str | Path) -> Scene:
     """
     text = reading.read_text(path, must=SCENE)
     try:
-        scene = from_table(parse_toml(text, Path(path).parent))
+        scene = from_table({"name": Path(path).stem} | parse_toml(text, Path(path).parent))
         if scene.body.file:  # relative to the scene file
             place = str((Path(path).parent / scene.body.file).resolve())
             scene = replace(scene, body=replace(scene.body, file=place))
@@ -135,6 +135,8 @@ def from_table(table: dict[str, Any]) -> Scene:
         section: read_keys(f"[{section}]", top.get(section, {}), keys)
         for section, keys in SECTIONS.items()
     }
+    if parts["probes"].get("probes") == ():
+        raise ValueError("points_mm is empty; give at least one probe")
     body = _body(parts["body"] | parts["placement"], preset)
     load = Load(**parts["load"])
     if parts["focus"] and not load.of_kind.is_of_device:

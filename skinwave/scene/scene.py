@@ -37,13 +37,15 @@ __all__ = [
     "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "STILL", "SURFACE",
     "Body", "Layer", "Load", "Mounting", "Phalanx", "Placement", "Reading", "Relief", "Scene",
     "Sides",
-    "body_name", "check_motion", "kind_of", "solid_of", "with_body", "without_tacton",
+    "body_name", "check_motion", "default_probes", "kind_of", "solid_of", "with_body",
+    "without_tacton",
 ]  # fmt: skip
 
 SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest relevant line
 MOST_VALUES = 50_000_000  # of all waveforms of one response, 400 MB
 STILL = MovingPressure(tacton=Tacton())
 PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
+OUTERMOST = 0.75  # of half the width of a narrower body, where its surface is not yet too steep
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,15 +91,15 @@ class Scene:
     name : str
     pressure : MovingPressure, with the Tacton; for a load without a device, that of the load
     body : Body
-    probes : (p, 2) float, m, positions on the surface
+    probes : (p, 2) float, m, positions on the surface; by default those of `default_probes`
     depth : float or (p,) float, m, of the probes below the surface, along its normal
     load : Load, its kind and gravity
     quantity : str, what probes read, a name in `simple_model.quantities.QUANTITIES`
     spreads : (dotted key of a scene file, Distribution about the scene's value) of uncertain
         numbers. `skinwave.scene.spreads` adds those of presets and of the device.
 
-    Raises a ValueError if a probe or the path of the focus lies outside the body, if there is no
-    probe, or if the body does not have the quantity or depth.
+    Raises a ValueError if a probe or the path of the focus lies outside the body, or if the body
+    does not have the quantity or depth.
 
     >>> from simple_model import MovingPressure, Tacton
     >>> scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=BODIES["palm"])
@@ -108,7 +110,7 @@ class Scene:
     name: str = "scene"
     pressure: MovingPressure
     body: Body
-    probes: tuple[tuple[float, float], ...] = PROBES
+    probes: tuple[tuple[float, float], ...] = ()
     depth: float | tuple[float, ...] = 0.0
     quantity: str = DISPLACEMENT.name
     load: Load = PRESSURE
@@ -117,6 +119,8 @@ class Scene:
     def __post_init__(self) -> None:
         acting = self.load.of_kind.acting(self.load, self.pressure)
         object.__setattr__(self, "pressure", acting)
+        if not len(self.probes):
+            object.__setattr__(self, "probes", default_probes(self.body))
         self._check_probes()
         self._check_load()
         _check_reading(self.body, self.reading)
@@ -124,8 +128,6 @@ class Scene:
             self._check_extent()
 
     def _check_probes(self) -> None:
-        if not self.probes:
-            raise ValueError("points_mm is empty; give at least one probe")
         if (values := len(self.probes) * self.tacton.duration * SAMPLE_RATE) > MOST_VALUES:
             raise ValueError(
                 f"{len(self.probes):,} probes for {self.tacton.duration:g} s give {values:,.0f} "
@@ -222,6 +224,17 @@ class Scene:
 
     def _repr_html_(self) -> str:
         return call_report("notebook", "scene_page", self)
+
+
+def default_probes(body: Body) -> tuple[tuple[float, float], ...]:
+    """Return the probes in m of a scene that gives none: `PROBES`, or closer ones on a body that is
+    too narrow for them. The width of a body from a file is not known; it gets `PROBES`.
+    """
+    half, furthest = body.width / 2, PROBES[-1][0]
+    if not body.of_kind.is_bounded or half >= furthest:
+        return PROBES
+    step = float(f"{OUTERMOST * half / (len(PROBES) - 1):.2g}")
+    return tuple((round(k * step, 9), 0.0) for k in range(len(PROBES)))
 
 
 def _check_reading(body: Body, reading: Reading) -> None:

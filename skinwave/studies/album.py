@@ -58,8 +58,8 @@ from skinwave.scene.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.system.document import worst_warnings
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.json_kinds import EFFORT, PLAN, effort_of, fitting
+from skinwave.typing import Floats
 
-KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
 LARGER = 1.5  # element size of pictures over the default one, at a fifth of the time
 PLANNED = 0.05  # tolerance of the plan on the page
 
@@ -172,12 +172,13 @@ def compute_views(
     tones = max(repetition_frequencies(scene.tacton).values(), default=0.0)
     fastest = max(map(fastest_line, moved.values()), default=tones)
     part = played_part(scene.pressure, fastest, frames)  # all views play the same part
+    reach = _reach(columns, moved)
     for column, each in columns.items():
         progress(f"response of {column}", 0.0)
         if column not in plans:
             run = Run(tacton=scene.name, body="none", scene=each, response=compute(each, column))
             is_shown = column == SAME_LOAD.name
-            yield kernel_view(each, KERNEL_REACH, part) if is_shown else None, run, None
+            yield kernel_view(each, reach, part) if is_shown else None, run, None
             continue
         own: Run | None = None
         with or_failed(failures, f"response of {column}"):
@@ -191,11 +192,21 @@ def compute_views(
             with or_failed(failures, pictured):
                 view = (
                     body_view(each, column, moved[column], part) if column in moved
-                    else flat_view(own, KERNEL_REACH, part)
+                    else flat_view(own, reach, part)
                 )  # fmt: skip
         yield view, own, plans[column]
     if plans and all(f"response of {column}" in failures for column in plans):
         raise ValueError(failure_text(failures))
+
+
+def _reach(columns: Mapping[str, Scene], moved: Mapping[str, BodyMotion]) -> Floats:
+    """Return the half sides (2,) in m of a flat view, which is as large as the largest body."""
+    half = [[each.body.width / 2, each.body.height / 2]
+            for each in columns.values() if each.body.of_kind.is_bounded]  # fmt: skip
+    for column in (name for name in moved if not columns[name].body.of_kind.is_bounded):
+        mesh = moved[column].mesh
+        half.append(np.abs(mesh.points[np.unique(mesh.facets["top"]), :2]).max(axis=0))
+    return np.max(half, axis=0)
 
 
 def _has_elements(scene: Scene, h: float | None) -> bool:

@@ -79,6 +79,11 @@ ABOUT_MAPS = (
     "delay, that of the kernel's strongest component, is known up to whole periods, and includes "
     "the phase lag of the body; below 0 the body is ahead."
 )
+BODY_CAPTION = (
+    "at rest, as it is meshed, with its boundary conditions. A colour that fades in shows a "
+    "support that begins smoothly, and a plate below the body the condition of its base. A body of "
+    "several materials is cut open."
+)
 WAVEFORMS = "Waveforms and spectra; each row is a probe."
 LOADS = (
     "The published kernel has its published load: a linear drive and a sinc² main lobe. All "
@@ -108,7 +113,7 @@ class Gallery:
     def image(self, name: str, pixels: Any, caption: str) -> Picture:
         """Return an image (ny, nx, 3) of bytes with its file."""
         image, buffer = Pillow.fromarray(pixels), io.BytesIO()
-        image.save(buffer, format="png", optimize=True)
+        image.save(buffer, format="png", optimize=True, dpi=(self.style.dpi, self.style.dpi))
         small, kind = _compress(image)
         return Picture(small, caption, name, kind, {"png": buffer.getvalue()})
 
@@ -146,11 +151,13 @@ def page_of(
     modelled : further parts of what was modelled
     command, notes : command that makes the page again, and notes on it
     seconds : duration of all runs, the sum of their efforts if not given
-    failures : reasons of parts that failed
+    failures : reasons of parts that failed; those of this page are added
     """
-    runs, failures = [run for group in groups.values() for run in group], failures or {}
+    runs = [run for group in groups.values() for run in group]
+    failures = {} if failures is None else failures
     is_single = len(groups) == 1
-    body: list[Part] = [*before, *_waveforms(figures or groups, gallery, progress), *after]
+    shown = _body_parts(runs, gallery, failures) if is_single else []
+    body = [*before, *shown, *_waveforms(figures or groups, gallery, progress), *after]
     body += tables.claims_parts(evaluate(assessable_runs(runs)))
     effects = first.effects if first else effects_of(groups, quick_maps)
     if effects:
@@ -183,8 +190,26 @@ def page_of(
             numbers = gallery.figure("numbers", drawn, overview.ABOUT)
             detail = Section(f"One of them: {first.kernel.tacton}", own)
             parts = [overview.table(effects), numbers, parts[0], *spatial, detail, *parts[1:]]
-    shown = [" ".join(verdict)] if verdict else []
-    return Report(title, shown, parts, efforts_of(runs), PICTURES, failures)
+    verdict = [" ".join(verdict)] if verdict else []
+    return Report(title, verdict, parts, efforts_of(runs), PICTURES, failures)
+
+
+def _body_parts(runs: Sequence[Run], gallery: Gallery, failures: dict[str, str]) -> list[Part]:
+    """Return the pictures of bodies that were computed by elements, or the reason why not."""
+    meshed = [run for run in runs if named(run.model).default_size]
+    if meshed and not renderer().is_available:
+        return [Section("The body", [f"Its picture is left out: {renderer().detail}."])]
+    parts: list[Part] = []
+    for run in meshed:
+        from skinwave.report.body_picture import body_picture, drawn_size  # slow to import
+
+        with or_failed(failures, f"picture of {run.column} at rest"):
+            size = significant(1e3 * drawn_size(run.scene.body), 2)
+            pixels = body_picture(run.scene, gallery.style)
+            caption = f"{label(run.column)} {BODY_CAPTION} Elements in this picture: {size} mm."
+            name = "body" if len(meshed) == 1 else f"body-{run.column}"
+            parts.append(gallery.image(name, pixels, caption))
+    return [Section("The body", parts)] if parts else []
 
 
 def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
@@ -331,8 +356,11 @@ def four_numbers(first: FirstScreen) -> Table:
         (f"delay of {_line_text(effects[0].kernel_strongest)}", "0 ms", map(_delay_text, effects)),
     ]  # fmt: skip
     name = f"{first.kernel.tacton}, same load"
-    columns = [name, "point kernel", *(label(each.column) for each in effects)]
-    return Table(columns, [[heading, kernel, *values] for heading, kernel, values in rows])
+    bodies = [label(each.column) for each in effects]
+    if not first.maps:  # no map, and so no value of the kernel
+        return Table([name, *bodies], [[heading, *values] for heading, _, values in rows])
+    table = [[heading, kernel, *values] for heading, kernel, values in rows]
+    return Table([name, "point kernel", *bodies], table)
 
 
 def _deflection_text(run: Run) -> str:
@@ -462,4 +490,6 @@ def _effects_table(effects: Mapping[str, Mapping[str, Propagation]]) -> list[Par
         "phase delay of that component, ms", "strongest component, kernel",
         "strongest component, body", "highest sensation level",
     ]  # fmt: skip
-    return [ABOUT_MAPS, Table(columns, rows)]
+    known = [k for k in range(len(columns)) if any(row[k] is not None for row in rows)]
+    rows = [[row[k] for k in known] for row in rows]
+    return [ABOUT_MAPS, Table([columns[k] for k in known], rows)]

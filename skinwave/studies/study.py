@@ -39,7 +39,7 @@ from skinwave.results.surface import element_map, grid, map_motions
 from skinwave.results.views import View, body_view, flat_view, kernel_view
 from skinwave.scene import paper15
 from skinwave.scene.scene import Body, Scene, with_body
-from skinwave.studies.album import KERNEL_REACH, scene_columns
+from skinwave.studies.album import scene_columns
 from skinwave.studies.first_screen import (
     Maps,
     beside_kernel,
@@ -341,7 +341,8 @@ def _response(
     with or_failed(failures, f"map of {column}"):
         surface = Surface(maps=quick_maps(run))
         if part and surface.maps:
-            surface = replace(surface, view=flat_view(run, KERNEL_REACH, part))
+            reach = np.array([scene.body.width, scene.body.height]) / 2
+            surface = replace(surface, view=flat_view(run, reach, part))
     return response, ({(name, column): surface}, failures)
 
 
@@ -377,5 +378,7 @@ def _element_surfaces(
 def _views(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:
     """Return the views of the kernel and of the bodies under one Tacton, if there are any."""
     own = [view for each in surfaces.values() if (view := each.view)]
-    kernel = kernel_view(scenes[SAME_LOAD.name], KERNEL_REACH, _played(scenes))
-    return [kernel, *own] if own else []
+    if not own:
+        return []
+    reach = np.max([np.abs(view.places).max(axis=0) for view in own], axis=0)
+    return [kernel_view(scenes[SAME_LOAD.name], reach, _played(scenes)), *own]

@@ -26,13 +26,14 @@ from simple_model import MovingPressure, Tacton, Trajectory, pattern_period, pub
 from simple_model.quantities import DISPLACEMENT
 from skinwave.commands.cli import main
 from skinwave.models.options import SolveOptions
-from skinwave.report import films, maps, render
+from skinwave.report import body_picture, films, maps, render
 from skinwave.report.renderer import Renderer, renderer
 from skinwave.report.spectra import levels_figure, tacton_figure
 from skinwave.report.styles import style
 from skinwave.results import exports, motion, playback, views
+from skinwave.results.surface import SurfaceField
 from skinwave.scene.file import dumps
-from skinwave.scene.scene import Body, Scene
+from skinwave.scene.scene import BODIES, Body, Layer, Mounting, Scene, Sides
 from skinwave.studies import album, pages, report
 
 ONLY = "point-kernel-published,point-kernel,skin-slab"
@@ -183,6 +184,97 @@ def test_motion_is_exaggerated_as_stated(seen):
     assert render.scale_text(seen["point-kernel"]) == "pressure, no motion"
 
 
+def test_a_flat_view_is_as_large_as_the_largest_body(seen):
+    sizes = {name: np.ptp(view.places, axis=0) for name, view in seen.items()}
+    kernel = sizes.pop("point-kernel")
+    np.testing.assert_allclose(kernel, np.max(list(sizes.values()), axis=0), rtol=1e-9)
+
+
+def test_axes_end_where_data_end(folder, seen):
+    view = seen["skin-slab"]
+    reach = 1e3 * np.abs(view.places).max(axis=0) + 1e-6
+    for ax in maps.snapshots_figure([view], style("report")).axes[:4]:
+        assert len(ax.lines) == 4  # path, focus and both sides of the cone
+        assert all((np.abs(line.get_xydata()) <= reach).all() for line in ax.lines)
+    runs = album.open_album(folder).groups["small"]
+    levels = levels_figure(runs, 0, style("report")).axes[0]
+    drawn = [line.get_ydata() for line in levels.lines if len(line.get_ydata()) > 2]
+    assert levels.get_ylim()[1] <= 10 * np.concatenate(drawn).max()
+
+
+def test_a_map_of_small_values_has_short_numbers(scene):
+    line = np.linspace(-0.01, 0.01, 9)
+    rms = 3e-7 * np.add.outer(line**2, line**2) / line[-1] ** 2
+    rms[:3, :3] = np.nan
+    field = SurfaceField(x=line, y=line, rms=rms)
+    field_figure = maps.surfaces_figure(scene, {"small": replace(field, rms=1e-4 * rms)})
+    plot, bar = field_figure.axes
+    field_figure.draw_without_rendering()
+    assert "10\u207b\u2075 \u00b5m" in bar.get_ylabel()
+    assert not bar.yaxis.get_offset_text().get_text()
+    shown = plot.images[0].get_array()
+    assert min(shown.shape) > 100
+    assert shown.max() == pytest.approx(6, rel=1e-6)
+    assert np.ma.masked_invalid(shown).mask[0, 0]
+
+
+LAYERED = Body(
+    width=0.03, height=0.03, depth=0.01, sides=Sides(left="clamped"), material="muscle",
+    layers=(Layer(thickness=0.002, material="fat"),),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("body", "named", "materials"),
+    [
+        (LAYERED, {"free", "clamped", "absorbing"}, {"fat", "muscle"}),
+        (BODIES["fingertip"], {"free", "clamped"}, {"palm", "bone"}),
+        (Body(kind="palm"), {"free", "on springs", "absorbing"}, {"palm"}),
+        (
+            replace(BODIES["paper-sheet"], mounting=Mounting(edges=("left",), support="clamped")),
+            {"free", "clamped"}, {"paper-grain"},
+        ),
+    ],
+)  # fmt: skip
+def test_a_body_is_drawn_with_its_conditions_and_materials(body, named, materials):
+    drawn = body_picture.meshed_body(body)
+    assert set(drawn.conditions) == named
+    middles = drawn.points[drawn.facets[:, :3]].mean(axis=1)
+    half = 1e3 * np.array([body.width, body.height]) / 2
+    assert (np.abs(drawn.points[drawn.facets][..., :2]) <= half + 1).all()  # mounds bulge
+    clamped, size = middles[drawn.conditions == "clamped"], body_picture.drawn_size(body)
+    if body.kind == "slab":
+        at_left = np.isclose(clamped[:, 0], -half[0])
+        assert at_left.any()
+        assert (at_left | np.isclose(clamped[:, 2], -1e3 * body.depth)).all()
+    elif len(clamped):
+        axis = 0 if body.kind == "sheet" else 1
+        assert (clamped[:, axis] < -half[axis] + 1e3 * size).all()
+    shown = {drawn.names[k] for k in np.unique(drawn.region).tolist()}
+    assert shown == materials
+    assert drawn.is_cut == (len(materials) > 1)
+
+
+@draws
+def test_the_section_of_a_body_has_the_colours_of_its_legend(scene):
+    small = replace(scene, body=LAYERED, probes=((0.0, 0.0), (0.01, 0.0)))
+    pixels = body_picture.body_picture(small)
+    assert pixels.shape[1] == render.WIDTH
+    printed = body_picture.body_picture(small, style("print"))
+    assert printed.shape[1] == 7 * 300
+    for colour in body_picture.REGIONS[:2]:
+        shade = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)])
+        assert (np.abs(pixels.astype(int) - shade).max(axis=2) < 4).sum() > 5000
+
+
+def test_a_page_says_why_it_has_no_picture_of_the_body(monkeypatch):
+    run = SimpleNamespace(model="fem", column="palm")
+    monkeypatch.setattr(pages, "renderer", lambda: NO_GL)
+    (part,) = pages._body_parts([run], pages.Gallery(), {})
+    assert "apt install libegl1" in str(part)
+    assert pages._body_parts([SimpleNamespace(model="flat-body")], pages.Gallery(), {}) == []
+
+
 @draws
 def test_a_film_has_distinct_frames_and_repeats_without_a_jump(seen, tmp_path):
     films.film(tmp_path / "film.gif", [seen["skin-slab"]], style("report"), panel=(160, 144))
@@ -279,7 +371,7 @@ def test_no_text_of_a_figure_is_cut(folder):
         assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
         if chosen.columns:
             assert figure.get_figwidth() in chosen.columns
-            assert sizes(figure) == {8.0}
+            assert sizes(figure) <= {8.0, 10.0}  # names of lines, with subscripts of 7 points
 
 
 @needs_browser

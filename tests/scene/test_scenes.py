@@ -92,6 +92,22 @@ def test_missing_keys_take_the_value_of_the_preset():
     assert loads("").pressure.drive == "pressure_squared"
 
 
+def test_default_probes_lie_on_a_narrow_body(tmp_path):
+    path = tmp_path / "small-finger.toml"
+    path.write_text(f'{TACTON}[body]\npreset = "fingertip"', encoding="utf-8")
+    scene = read(path)
+    assert scene.name == "small-finger"
+    x, y = scene.probe_points.T
+    assert len(x) == 5
+    assert (y == 0).all()
+    assert 0.003 < x.max() < scene.body.width / 2
+    assert loads(dumps(scene)).probes == scene.probes
+    assert loads("").probes[-1] == (0.02, 0.0)  # wide enough
+    given = '[body]\npreset = "fingertip"\n[probes]\npoints_mm = [[0, 0], [20, 0]]'
+    with pytest.raises(ValueError, match="outside the body"):
+        loads(given)
+
+
 def test_keys_have_their_units():
     scene = loads(
         "[tacton]\namplitude_percent = 50\nshape = 'circle'\nsize_mm = 20\nspeed_m_per_s = 12\n"

@@ -241,7 +241,7 @@ def test_the_budget_of_a_sheet_agrees_with_samples():
     assert error_budget(scene).material == pytest.approx(expected, rel=0.1)
     curled = loads('[body]\nkind = "sheet"\n[body.mounting]\ncurl_x_mm = 1')
     assert isnan(error_budget(curled).material)
-    assert "not computed" in mesh_row(curled, None, 0.1).value
+    assert "not computed (the sheet" in mesh_row(curled, None, 0.1).value
 
 
 def test_a_finer_mesh_than_a_tenth_of_the_material_gains_nothing():
