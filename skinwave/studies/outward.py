@@ -11,8 +11,8 @@ from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Floats
 
 FARTHEST, STEP = 40e-3, 0.5e-3  # m: longest line, and resolution of its end on a body
-# Distances of probes, in units of the smaller of 5 mm and a quarter of the line.
-UNIT, PLACED = 5e-3, np.array([0, 1, 2, 3, 4, 6, 8])
+# Distances of probes before the end, in units of the smaller of 5 mm and a quarter of the line.
+UNIT, PLACED = 5e-3, np.array([0, 1, 2, 3, 4, 6])
 INNER = 0.9  # of the way to the edge of the body, where its surface slopes
 SAME = 1e-6  # m
 LOWEST = -100.0  # dB, of what does not vibrate
@@ -61,11 +61,11 @@ def outward(scene: Scene, body: Body, h: float) -> Outward | None:
     steps = np.arange(round(FARTHEST / STEP) + 1) * STEP
     off = np.flatnonzero(~_on_body(body, start + steps[:, None] * axis, h))
     steps = steps[: off[0]] if len(off) else steps
-    if len(steps) < len(PLACED):
+    if len(steps) <= len(PLACED):
         return None
     end = INNER * steps[-1] if len(off) else FARTHEST
     distances = min(UNIT, end / 4) * PLACED
-    distances = distances[distances <= end + SAME]
+    distances = np.append(distances[distances < 0.9 * end], end)
     every, index = list(scene.probes), []
     for place in start + distances[:, None] * axis:
         apart = np.linalg.norm(np.array(every) - place, axis=1)
