@@ -58,7 +58,7 @@ WEAKEST_PHASE = 0.02  # of a line's largest amplitude: weaker lines have no phas
 def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     """Draw waveform and spectrum at each probe, with all models in one panel."""
     probes, narrow = runs[0].response.probes, style.is_narrow
-    size = style.size(10.5, 1.25 * len(probes) + 1.3)
+    size = style.size(10.5, 1.05 * len(probes) + 1.3)
     figure = Figure(figsize=(size[0], 0.75 * len(probes) + 1.6) if narrow else size)
     axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
     rows = _legend(figure, runs)

@@ -147,7 +147,7 @@ def sentences(effects: Effects, groups: Mapping[str, Sequence[Run]]) -> list[str
         parts.append(
             f"Under the same {len(effects)} loads, half of the motion lies within "
             f"{_text(kernel, 'mm')} of the path in the kernel, {each}: waves carry it out of the "
-            "focus, and the edges of a sheet throw them back."
+            "focus, and the edges of a sheet reflect them."
         )
     gains = {c: _gains(effects, groups, c) for c in columns}
     most = max(gains, key=lambda c: len(gains[c]))

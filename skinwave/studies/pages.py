@@ -179,11 +179,11 @@ def page_of(
     parts: list[Part] = [contents(body), *caveats, *body]
     verdict: list[str] = []
     if first:
-        own: list[Part] = [four_numbers(first), *_first_parts(first, gallery)]
+        own = _first_parts(first, gallery)
         spatial = _spatial_parts(first, gallery, failures)
         if is_single:
             verdict = sentences(first)
-            parts = [own[0], parts[0], *own[1:2], *spatial, *own[2:], *parts[1:]]
+            parts = [four_numbers(first), parts[0], *own[:-1], *spatial, own[-1], *parts[1:]]
         else:
             verdict = [*overview.sentences(effects, groups), *sentences(first)[1:]]
             drawn = overview.figure(effects, gallery.style)

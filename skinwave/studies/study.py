@@ -134,6 +134,8 @@ def run_study(
                 write_run(folder / run.tacton / run.column, run)
                 groups.setdefault(run.tacton, []).append(run)
             interrupted = False
+        for name, group in groups.items():  # in the order of the columns
+            group.sort(key=lambda run: [*scenes[name]].index(run.column))
         runs = [run for group in groups.values() for run in group]
         if interrupted and not runs:
             raise KeyboardInterrupt
@@ -377,7 +379,8 @@ def _element_surfaces(
 
 def _views(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:
     """Return the views of the kernel and of the bodies under one Tacton, if there are any."""
-    own = [view for each in surfaces.values() if (view := each.view)]
+    views = {view.column: view for each in surfaces.values() if (view := each.view)}
+    own = [views[column] for column in scenes if column in views]
     if not own:
         return []
     reach = np.max([np.abs(view.places).max(axis=0) for view in own], axis=0)

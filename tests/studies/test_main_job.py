@@ -122,9 +122,9 @@ def test_the_page_stands_alone(job):
 
 @needs_browser
 def test_the_page_has_at_most_four_screens(job, browser):
-    tab = browser.new_page(viewport={"width": 1200, "height": 900})
+    tab = browser.new_page(viewport={"width": 1200, "height": 800})
     tab.goto(f"file://{job[0] / 'index.html'}")
-    assert tab.evaluate("document.documentElement.scrollHeight") <= 4 * 900
+    assert tab.evaluate("document.documentElement.scrollHeight") <= 4 * 800
     chosen = tab.locator(".choice > div:visible")
     assert chosen.inner_text().startswith("am140-stm20")
     tab.click("label:text-is('am140')")
