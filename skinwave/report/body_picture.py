@@ -34,6 +34,7 @@ from skinwave.report.render import (
     bar_length,
     pixels,
     raster,
+    silence_vtk,
 )
 from skinwave.report.styles import Style
 from skinwave.results.views import path_points, split
@@ -291,6 +292,7 @@ def _render(
     """Return the picture without its text."""
     import pyvista as pv
 
+    silence_vtk()
     plotter = pv.Plotter(off_screen=True, lighting="none", window_size=size)
     pixel = size[0] / 1600
     try:

@@ -97,6 +97,13 @@ def picture(
         return show(frame)
 
 
+def silence_vtk() -> None:
+    """Print no warnings of VTK, such as those about displays."""
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+
+
 def pixels(style: Style, inch: float) -> int:
     """Return the width in pixels of a picture that is `inch` wide in print."""
     return round(inch * style.dpi) if style.columns else WIDTH
@@ -122,9 +129,8 @@ def stage(
     Letters have `LETTERS` points in a picture that is `inch` wide.
     """
     import pyvista as pv
-    from vtkmodules.vtkCommonCore import vtkLogger
 
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # warnings about displays
+    silence_vtk()
     width, height = panel or style.panel
     column = round(COLUMN * height)
     letter = max(LETTERS / 72 * (width * len(views) + column) / inch, LEAST_LETTER)
