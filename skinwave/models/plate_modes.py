@@ -318,9 +318,10 @@ FROM_REST = register(
 def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Solve the linear motion from rest, and add the effect of stretching."""
     started = time.perf_counter()
-    linear = FROM_REST.solve(scene, times, options)
     modes: PlateModes = modes_of(plate_of(scene.body))
-    found = _stretch(scene, times, options, modes, linear.values)
+    found = _stretch(
+        scene, len(times), step(times), options.tolerance, options.dt, options.progress
+    )
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
         reduced_dofs=found.count, steps=found.parts * (len(times) - 1),
@@ -329,7 +330,7 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
             parts=(ERROR, thin_plate_part(scene), found.error), tolerance=options.tolerance
         ),
     )  # fmt: skip
-    return response_of(scene, STRETCHED.name, times, linear.values + found.values, effort)
+    return response_of(scene, STRETCHED.name, times, found.linear + found.values, effort)
 
 
 def first_part(scene: Scene, times: Floats) -> Floats:
@@ -352,9 +353,8 @@ def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Callab
     of all modes that move, and the function of their shapes (p, m) at places (p, 2) in m.
     """
     times, middle = sample_times(scene), scene.body.placement.offset
-    options = SolveOptions(tolerance=tolerance)
     modes: PlateModes = modes_of(plate_of(scene.body))
-    found = _stretch(scene, times, options, modes, FROM_REST.solve(scene, times, options).values)
+    found = _stretch(scene, len(times), step(times), tolerance)
     plate, stretching = _coordinates(
         scene.pressure, scene.body, len(times), step(times), found.count, found.parts
     )
@@ -367,39 +367,46 @@ def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Callab
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stretching:
-    """What stretching adds to a response, `values` (t, p), with `count` modes, and `parts` time
-    steps for each sample, and the `error` of both.
+    """What stretching adds to a `linear` response (t, p), `values` (t, p), with `count` modes, and
+    `parts` time steps for each sample, and the `error` of both.
     """
 
+    linear: Floats
     values: Floats
     count: int
     parts: int
     error: ErrorPart
 
 
+@lru_cache(maxsize=1)  # a response and a map of the same motion
 def _stretch(
-    scene: Scene, times: Floats, options: SolveOptions, modes: PlateModes, linear: Floats
-) -> Stretching:
-    """Return what stretching adds to a linear response (t, p), within the tolerance if possible.
+    scene: Scene, samples: int, sample: float, tolerance: float, dt: float | None = None,
+    progress: Progress = silent,
+) -> Stretching:  # fmt: skip
+    """Return what stretching adds at every `sample` in s, within the tolerance if possible.
 
     The whole record is solved with what its first part needs, and with more if that is too little:
     a resonance may build up slowly, and errors grow with it.
     """
+    times: Floats = sample * np.arange(samples, dtype=np.float64)
+    options = SolveOptions(tolerance=tolerance, dt=dt, progress=progress)
+    linear = FROM_REST.solve(scene, times, options).values
     start = first_part(scene, times)
     options.progress("large deflection", 0.0)
-    found = _resolve(scene, start, options, modes, linear[: len(start)])
+    found = _resolve(scene, start, options, linear[: len(start)])
     if len(start) < len(times):
         options.progress("large deflection", 0.2)
-        found = _resolve(scene, times, options, modes, linear, (found.count, found.parts))
+        found = _resolve(scene, times, options, linear, (found.count, found.parts))
     return found
 
 
 def _resolve(
-    scene: Scene, times: Floats, options: SolveOptions, modes: PlateModes, linear: Floats,
+    scene: Scene, times: Floats, options: SolveOptions, linear: Floats,
     least: tuple[int, int] = (0, 1),
 ) -> Stretching:  # fmt: skip
     """Return what stretching adds, with at least the given numbers of modes and of parts."""
     sample, allowed = step(times), SHARE * options.tolerance
+    modes: PlateModes = modes_of(plate_of(scene.body))
     counts = [min(count, len(modes.squared)) for count in COUNTS]
     # A record of few samples cannot have longer steps.
     parts = max(least[1], 1 + (len(times) <= 4 * DEGREE))
@@ -438,7 +445,7 @@ def _resolve(
         f"{count} modes that stretch, in steps of {1e3 * sample / parts:.3g} ms",
         TRUNCATION * error, f", or skinwave run --dt {shorter}",
     )  # fmt: skip
-    return Stretching(values=values, count=count, parts=parts, error=part)
+    return Stretching(linear=linear, values=values, count=count, parts=parts, error=part)
 
 
 def steps_part(source: str, error: float, more: str = "") -> ErrorPart:

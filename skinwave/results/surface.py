@@ -169,8 +169,9 @@ def map_motions(
 def _plate_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions) -> SurfaceField:
     """Return the map of a thin plate from its modes, linear if the model is or if that suffices."""
     places, model = _places(x, y), options.model
-    is_linear = model != "auto" and not named(model).is_nonlinear
-    if is_linear or not stretches(scene, MAP_TOLERANCE):
+    is_given = model != "auto"
+    is_large = named(model).is_nonlinear if is_given else bool(stretches(scene, MAP_TOLERANCE))
+    if not is_large:
         return _field(scene, x, y, partial(plate_lines, places=places), "thin plate")
     lines, note = stretching_lines(scene, options.tolerance)
     return _field(scene, x, y, lambda _: lines(places), note)
