@@ -1,0 +1,122 @@
+"""Every kind of body at every door: a result with all its parts, or a sentence on what it lacks."""
+
+from dataclasses import replace
+
+import pytest
+
+import meshes
+from skinwave.bodies import KINDS
+from skinwave.commands.cli import main
+from skinwave.report.renderer import renderer
+from skinwave.results import playback
+from skinwave.studies import relax
+
+SCENE = """
+[tacton]
+am_frequency_hz = 150
+duration_s = 0.05
+shape = "circle"
+size_mm = 4
+speed_m_per_s = 2
+[probes]
+points_mm = [[0, 0], [4, 0]]
+[body]
+"""
+SMALL = "size_x_mm = 24\nsize_y_mm = 24\nthickness_mm = {}\n"
+LAYER = '[[body.layers]]\nthickness_mm = 2\nmaterial = "dermis"\n'
+BODY = {
+    "sheet": 'kind = "sheet"\nmaterial = "paper"\n' + SMALL.format(0.2),
+    "slab": SMALL.format(6) + 'sides = "clamped"\n',
+    "layers": SMALL.format(8) + 'sides = "clamped"\n' + LAYER,
+    "half-space": "thickness_mm = inf\n",
+    "disc": 'kind = "disc"\nmaterial = "ecoflex"\nsides = "free"\n' + SMALL.format(6),
+    "palm": 'kind = "palm"\n' + SMALL.format(8),
+    "layered palm": 'kind = "palm"\n' + SMALL.format(10) + LAYER.replace("= 2", "= 4"),
+    "finger": 'preset = "fingertip"\n',
+    "mesh": 'kind = "mesh"\nfile = "block.vtu"\n',
+    "regions": 'kind = "mesh"\nfile = "block.vtu"\nregions = { deep = "fat" }\n',
+}
+SIZE = ("--element-size", "6")  # mm
+QUIET = ("--quiet", "--out")
+
+
+@pytest.fixture(scope="module")
+def blocks(tmp_path_factory):
+    """A folder with a block of 24 x 24 x 8 mm, whose lower half is another region."""
+    folder = tmp_path_factory.mktemp("blocks")
+    mesh = meshes.block((0.024, 0.024, 0.008), 0.004)
+    deep = mesh.points[mesh.tets[:, :4], 2].mean(axis=1) < mesh.points[:, 2].max() - 4e-3
+    named = replace(mesh, facets={}, region=deep.astype(int), region_names={0: "skin", 1: "deep"})
+    meshes.write(folder / "block.vtu", named)
+    return folder
+
+
+@pytest.fixture
+def scene(blocks, monkeypatch, in_one_process):
+    """The name of a scene's file with a body, in a folder with the meshes; few frames of films."""
+    monkeypatch.chdir(blocks)
+    monkeypatch.setattr(relax, "can_be_alone", lambda *step: False)
+    for name in ("FEWEST_FRAMES", "MOST_FRAMES"):
+        monkeypatch.setattr(playback, name, 4)
+
+    def named(body):
+        (blocks / f"{body}.toml").write_text(SCENE + BODY[body])
+        return f"{body}.toml"
+
+    return named
+
+
+def sizes(body):
+    return () if body in ("half-space", "sheet", "finger") else SIZE
+
+
+@pytest.mark.parametrize("body", BODY)
+def test_a_body_is_planned_run_compared_and_fitted(body, scene, blocks, capsys):
+    file, size = scene(body), sizes(body)
+    assert main(["plan", file, *size]) == 0
+    assert main(["run", file, *size, *QUIET, f"{body} run"]) == 0
+    page = (blocks / f"{body} run/index.html").read_text()
+    assert "failed" not in page
+    assert f"<h1>{body}" in page
+    assert main(["compare", file, *size, *QUIET, f"{body} compared"]) == 0
+    page = (blocks / f"{body} compared/index.html").read_text()
+    assert "failed" not in page
+    assert "dB region" in page
+    assert (blocks / f"{body} compared/pictures/propagation.png").exists()
+    measured = ["--measured", f"{body} run/responses.npz", "--vary", "gain=0.1:10"]
+    assert main(["fit", file, *measured, *QUIET, f"{body} fit"]) == 0
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("body", BODY)
+def test_the_assumptions_of_a_body_are_relaxed(body, scene, blocks):
+    assert main(["relax", scene(body), *sizes(body), *QUIET, f"{body} relaxed"]) == 0
+    assert "no propagation" in (blocks / f"{body} relaxed/effects.csv").read_text()
+
+
+@pytest.mark.parametrize("body", BODY)
+def test_a_body_is_reported_with_its_map_and_film(body, scene, blocks):
+    file, size = scene(body), sizes(body)
+    assert main(["report", file, *size, *QUIET, f"{body} report"]) == 0
+    assert "failed" not in (blocks / f"{body} report/index.html").read_text()
+    reach = ("--reach", "8", "--step", "2")
+    assert main(["report", file, "--map", *reach, *size, *QUIET, f"{body} map"]) == 0
+    if renderer().is_available:
+        assert main(["report", file, "--film", *size, *QUIET, f"{body}.gif"]) == 0
+
+
+@pytest.mark.parametrize("body", BODY)
+def test_a_body_is_swept_and_drawn_live(body, scene, blocks):
+    file = scene(body)
+    vary = ("--vary", "tacton.am_frequency_hz=120,150", "--workers", "1")
+    assert main(["sweep", file, *vary, *sizes(body), *QUIET, f"{body} sweep"]) == 0
+    assert main(["live", file, *QUIET, f"{body}.html"]) == 0
+
+
+@pytest.mark.parametrize("body", BODY)
+def test_dispersion_is_that_of_flat_layers_or_refused(body, scene, capsys):
+    file = scene(body)
+    kind = {"finger": "finger", "mesh": "mesh", "regions": "mesh", "disc": "disc"}.get(body, "slab")
+    code = main(["dispersion", file, *QUIET, f"{body} waves"])
+    assert code == (0 if KINDS[kind].dispersion else 2)
+    assert ("dispersion curves support" in capsys.readouterr().err) == bool(code)
