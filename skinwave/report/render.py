@@ -97,11 +97,25 @@ def picture(
         return show(frame)
 
 
-def silence_vtk() -> None:
-    """Print no warnings of VTK, such as those about displays."""
+@contextmanager
+def new_plotter(style: Style, size: tuple[int, int], panels: int = 1) -> Iterator[Any]:
+    """Context manager of a plotter with panels side by side, each of a size in pixels.
+
+    VTK prints no warnings, such as those about displays.
+    """
+    import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
 
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    plotter = pv.Plotter(
+        off_screen=True, lighting="none", shape=(1, panels), border=False,
+        window_size=(size[0] * panels, size[1]),
+    )  # fmt: skip
+    try:
+        plotter.set_background(style.paper)
+        yield plotter
+    finally:
+        plotter.close()
 
 
 def pixels(style: Style, inch: float) -> int:
@@ -128,18 +142,10 @@ def stage(
     for a single view, in its unit; other quantities in their unit, from 0 if they have no sign.
     Letters have `LETTERS` points in a picture that is `inch` wide.
     """
-    import pyvista as pv
-
-    silence_vtk()
     width, height = panel or style.panel
     column = round(COLUMN * height)
     letter = max(LETTERS / 72 * (width * len(views) + column) / inch, LEAST_LETTER)
-    plotter = pv.Plotter(
-        off_screen=True, lighting="none", shape=(1, len(views)), border=False,
-        window_size=(width * len(views), height),
-    )  # fmt: skip
-    try:
-        plotter.set_background(style.paper)
+    with new_plotter(style, (width, height), len(views)) as plotter:
         limits, title = _colour_scale(views)
         bar = _colour_bar(limits, title, style, letter, (column, height))
         panels = []
@@ -151,8 +157,9 @@ def stage(
                 low, high = view.places.min(axis=0), view.places.max(axis=0)
                 rim = np.where([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], high, low)
                 plotter.add_mesh(_line(rim, 0.0), color="#9a9a9a", line_width=1)
-        shown = [each for panel in panels
-                 for each in (1e3 * panel.view.points[panel.nodes], _bar(panel.view))]  # fmt: skip
+        shown = [each for panel in panels for each in (
+            1e3 * panel.view.points[panel.nodes], scale_bar(1e3 * panel.view.points)
+        )]  # fmt: skip
         fitting = Projection.of(CAMERAS[camera], np.vstack(shown), width / height, FILLED, MIDDLE)
         for k in range(len(views)):
             plotter.subplot(0, k)
@@ -163,16 +170,14 @@ def stage(
             set_frame(panels, frame, limits[1])
             plotter.subplot(0, 0)
             stamp = f"t = {1e3 * views[0].times[frame]:.2f} ms"
-            _write(plotter, stamp, (0.66, 0.03), letter, style.ink, name="time", render=False)
+            write(plotter, stamp, (0.66, 0.03), letter, style.ink, name="time", render=False)
             plotter.render()  # otherwise the screenshot is the previous picture
             return np.hstack([plotter.screenshot(None, return_img=True), bar])
 
         yield show
-    finally:
-        plotter.close()
 
 
-def _write(
+def write(
     plotter: Any, text: str, place: tuple[float, float], letter: float, ink: str, **options: Any
 ) -> None:
     """Write text with letters of so many pixels at a place of the current panel."""
@@ -223,7 +228,7 @@ def make_panel(view: View, cut: bool = False) -> Panel:
     path, probes = path_points(view.scene), view.scene.probe_points
     reach = np.abs(view.places).max(axis=0)
     probes = probes[(np.abs(probes) <= reach).all(axis=1) & ~(cut & (probes[:, 1] < 0))]
-    lift = LIFT * size_of(view)
+    lift = LIFT * 1e3 * float(np.ptp(view.places, axis=0).max())
     riding = [(pv.PolyData(_lift(probes, lift)), probes)] if len(probes) else []
     riding += [(_line(path, lift, cut), path)] if len(path) > 1 else []
     if cut:  # the upper edge of the section
@@ -236,11 +241,6 @@ def make_panel(view: View, cut: bool = False) -> Panel:
         focus=pv.PolyData(_lift(path[:1], lift)), under_focus=under, factor=exaggeration(view),
         lift=lift,
     )  # fmt: skip
-
-
-def size_of(view: View) -> float:
-    """Return the longer side of a surface in mm."""
-    return 1e3 * float(np.ptp(view.places, axis=0).max())
 
 
 def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
@@ -280,48 +280,53 @@ def _draw_panel(
         show_scalar_bar=False, smooth_shading=True,
         ambient=0.3 if lit else 0.0, diffuse=0.8 if lit else 1.0, lighting=lit,
     )  # fmt: skip
+    add_marks(plotter, [mark for mark, _ in panel.marks], panel.focus, letter)
+    own = colour(view.column)
+    ink = style.ink if own == "#000000" else own
+    write(plotter, label(view.column), (0.04, 0.92), 1.25 * letter, ink)
+    text = scale_text(view).replace("; ", ";\n").replace("times, ", "times,\n")
+    rows = (1.4 + 1.15 * text.count("\n")) * letter / plotter.window_size[1]
+    write(plotter, text, (0.04, 0.92 - rows), letter, style.ink)
+    add_scale_bar(plotter, 1e3 * view.points, style, letter)
+
+
+def add_marks(plotter: Any, marks: Sequence[Any], focus: Any, letter: float) -> None:
+    """Draw a path, probes and the focus beside letters of so many pixels."""
     balls, pixel = {"render_points_as_spheres": True}, letter / 16
-    for mark, _ in panel.marks:
+    for mark in marks:
         if mark.n_lines:
             plotter.add_mesh(mark, color=PATH, line_width=2 * pixel)
         else:
             plotter.add_mesh(mark, color=PROBE, point_size=10 * pixel, **balls)
-    plotter.add_mesh(panel.focus, color=FOCUS, point_size=15 * pixel, **balls)
-    own = colour(view.column)
-    ink = style.ink if own == "#000000" else own
-    _write(plotter, label(view.column), (0.04, 0.92), 1.25 * letter, ink)
-    text = scale_text(view).replace("; ", ";\n").replace("times, ", "times,\n")
-    rows = (1.4 + 1.15 * text.count("\n")) * letter / plotter.window_size[1]
-    _write(plotter, text, (0.04, 0.92 - rows), letter, style.ink)
-    _add_scale_bar(plotter, view, style, letter)
+    plotter.add_mesh(focus, color=FOCUS, point_size=15 * pixel, **balls)
 
 
-def _add_scale_bar(plotter: Any, view: View, style: Style, letter: float) -> None:
-    """Draw a scale bar along x, in front of the body."""
+def add_scale_bar(plotter: Any, points: Floats, style: Style, letter: float) -> None:
+    """Draw the scale bar of a body with points (n, 3) in mm."""
     import pyvista as pv
 
-    ends = _bar(view)
-    plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=letter / 4)
+    ends = scale_bar(points)
     length = float(np.ptp(ends[:, 0]))
+    plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=letter / 4)
+    add_label(plotter, f"{length:g} mm", ends[1] + [length / 4, 0.0, 0.0], letter, style.ink)
+
+
+def add_label(plotter: Any, text: str, place: Floats, letter: float, ink: str) -> None:
+    """Write text to the right of a place (3,) in mm, with letters of so many pixels."""
     plotter.add_point_labels(
-        ends[1:] + [length / 4, 0.0, 0.0], [f"{length:g} mm"],
-        font_size=round(letter), font_file=FONT,
-        text_color=style.ink, shape=None, show_points=False, always_visible=True,
-        justification_horizontal="left", justification_vertical="center",
+        place[None], [text], font_size=round(letter), font_file=FONT, text_color=ink, shape=None,
+        show_points=False, always_visible=True, justification_horizontal="left",
+        justification_vertical="center",
     )  # fmt: skip
 
 
-def _bar(view: View) -> Floats:
-    """Return the ends (2, 3) of a scale bar in mm."""
-    left, front, bottom = 1e3 * view.points.min(axis=0)
-    length = bar_length(size_of(view))
-    front -= length / 2
+def scale_bar(points: Floats) -> Floats:
+    """Return the ends (2, 3) in mm of a scale bar along x, in front of points (n, 3) in mm."""
+    left, front, bottom = points.min(axis=0)
+    side = float(np.ptp(points[:, :2], axis=0).max())
+    length = next(length for length in BARS if length <= side / 4 or length == BARS[-1])
+    front -= side / 10
     return np.array([[left, front, bottom], [left + length, front, bottom]])
-
-
-def bar_length(side: float) -> float:
-    """Return the length in mm of the scale bar of a body with a side in mm."""
-    return next(length for length in BARS if length <= side / 4 or length == BARS[-1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -355,10 +360,6 @@ class Projection:
         return cls(
             axes=axes, middle=(low + high) / 2 + [0.0, half[1] * (1 - 2 * height)], half=half
         )
-
-    def at(self, point: Floats) -> Floats:
-        """Return the place (2,) of a point (3,) in the visible plane, in mm."""
-        return np.asarray(self.axes[:2] @ point)
 
     def apply(self, plotter: Any) -> None:
         """Set the camera and lights of a plotter's panel."""
