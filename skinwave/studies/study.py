@@ -151,29 +151,32 @@ def run_study(
         if not interrupted:
             views = _views(scenes[first_name(scenes)], found.surfaces)
             first = first_screen(groups, found.maps, views, found.checks)
-    parts: list[document.Part] = [*more]
-    figures: dict[str, Sequence[Run]] = dict(groups)
-    conclusions: list[str] = []
-    for name, group in groups.items() if measured else ():
-        from skinwave.measure import comparison_page  # slow to import
+        parts: list[document.Part] = [*more]
+        figures: dict[str, Sequence[Run]] = dict(groups)
+        conclusions: list[str] = []
+        for name, group in groups.items() if measured else ():
+            from skinwave.measure import comparison_page  # slow to import
 
-        assert measured
-        quantity = measured.measurement.quantity
-        comparison = compare_measured(
-            measured, [in_quantity(run, quantity, found.prepared) for run in group]
-        )
-        conclusions += [comparison_page.conclusion(comparison, c) for c in comparison.bodies]
-        comparison_page.write_tables(folder, comparison)
-        parts.append(comparison_page.page_section(comparison, Gallery().figure))
-        figures[name] = runs_to_draw(comparison)
-        first = replace(first, measured=measured_places(comparison)) if first else None
-    if interrupted:
-        parts.insert(0, f"Interrupted: this page shows the {len(runs)} finished of {planned} runs.")
-    page_of(
-        title, groups, first, Gallery(), figures=figures, progress=progress, before=parts,
-        modelled=[ABOUT], seconds=time.perf_counter() - started, command=command, failures=failed,
-        notes=["For one run: skinwave run TACTON/BODY/scene.toml in this folder."],
-    ).write(folder)  # fmt: skip
+            assert measured
+            quantity = measured.measurement.quantity
+            comparison = compare_measured(
+                measured, [in_quantity(run, quantity, found.prepared) for run in group]
+            )
+            conclusions += [comparison_page.conclusion(comparison, c) for c in comparison.bodies]
+            comparison_page.write_tables(folder, comparison)
+            parts.append(comparison_page.page_section(comparison, Gallery().figure))
+            figures[name] = runs_to_draw(comparison)
+            first = replace(first, measured=measured_places(comparison)) if first else None
+        if interrupted:
+            parts.insert(
+                0, f"Interrupted: this page shows the {len(runs)} finished of {planned} runs."
+            )
+        page_of(
+            title, groups, first, Gallery(workers=workers), figures=figures, progress=progress,
+            before=parts, modelled=[ABOUT], seconds=time.perf_counter() - started,
+            command=command, failures=failed,
+            notes=["For one run: skinwave run TACTON/BODY/scene.toml in this folder."],
+        ).write(folder)  # fmt: skip
     return StudyOutcome(
         assessed_claims=assessed_claims, warnings=document.worst_warnings(efforts_of(runs)),
         failures=failed, runs=len(runs), planned=planned, seconds=time.perf_counter() - started,
