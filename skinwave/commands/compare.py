@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from skinwave.measure.comparison import Measured
     from skinwave.scene.scene import Body
 
-LIVE = "live.html"
 PAPER = "paper-15"
 
 
@@ -51,17 +50,15 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
-    from skinwave.live.html_file import comparison_page
     from skinwave.measure.comparison import at_measured_places
     from skinwave.report.palette import label
     from skinwave.results import record
     from skinwave.results.files import folder_name
     from skinwave.scene import paper15
     from skinwave.scene.file import read
-    from skinwave.scene.scene import with_body
+    from skinwave.scene.scene import BODIES, with_body
     from skinwave.studies.first_screen import first_name
     from skinwave.studies.study import own_scenes, paper_scenes, run_study
-    from skinwave.system import document
 
     given = None if options.scene == PAPER else read(options.scene)
     bodies = _chosen_body(options)
@@ -79,14 +76,12 @@ def run(options: argparse.Namespace) -> int:
         out = f"{Path(options.scene).stem}-compared"
         inputs += [options.scene, given.body.file, options.measured or ""]
     with result_folder(options, out, inputs, given) as (folder, progress):
-        failures: dict[str, str] = {}
-        live = comparison_page(scenes[first_name(scenes)].values(), failures)
-        if live:
-            (folder / LIVE).write_text(live, encoding="utf-8")
+        live = list(scenes[first_name(scenes)].values())
+        if given is None:  # a palm takes minutes on the live page, a flat slab a second
+            live.append(with_body(live[-1], BODIES["skin-slab"]))
         outcome = run_study(
             scenes, folder, solving(options, progress, model=options.model), title=title,
-            command=record.command_entry(options)["typed"], measured=measured,
-            more=[document.live_link(LIVE)] if live else [], failures=failures,
+            command=record.command_entry(options)["typed"], measured=measured, live=live,
         )  # fmt: skip
     warn(outcome.warnings)
     claims = outcome.assessed_claims

@@ -94,18 +94,15 @@ def data_of(
     }  # fmt: skip
 
 
-def comparison_page(scenes: Iterable[Scene], failures: dict[str, str]) -> str | None:
-    """Return the page of the scenes with quick packs that it can set, skin first, or None. Adds
-    bodies that fail to the failures.
+def comparison_page(scenes: Iterable[Scene]) -> tuple[str, dict[str, str]]:
+    """Return the page of the scenes with quick packs that it can set, skin first, or "", and the
+    reasons of bodies that failed. Raises a ValueError if all fail.
     """
     quick = sorted(filter(_is_quick, scenes), key=lambda scene: not scene.body.is_skin)
     if not quick:
-        return None
-    with or_failed(failures, "live page"):
-        data = data_of(quick, test=False)
-        failures |= {f"live page of {name}": why for name, why in data["failures"].items()}
-        return page(data)
-    return None
+        return "", {}
+    data = data_of(quick, test=False)
+    return page(data), {f"live page of {name}": why for name, why in data["failures"].items()}
 
 
 def _distance(scene: Scene, probe: tuple[float, float]) -> float:

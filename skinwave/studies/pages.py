@@ -5,8 +5,10 @@ contents and one picture. A reader chooses one Tacton's waveforms at a time, and
 """
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -97,10 +99,11 @@ SENSATION = (
 
 @dataclass(frozen=True, kw_only=True)
 class Gallery:
-    """Style of pictures, and formats of figure files beside PNG."""
+    """Style of pictures, formats of figure files beside PNG, and processes that draw Tactons."""
 
     style: Style = REPORT
     formats: Sequence[str] = ()
+    workers: Executor | None = None
 
     def figure(self, name: str, figure: Figure, caption: str) -> Picture:
         """Return a figure with its files."""
@@ -156,8 +159,11 @@ def page_of(
     runs = [run for group in groups.values() for run in group]
     failures = {} if failures is None else failures
     is_single = len(groups) == 1
+    drawn = _drawn(figures or groups, gallery)
+    own = _first_parts(first, gallery) if first else []
+    spatial = _spatial_parts(first, gallery, failures) if first else []
     shown = _body_parts(runs, gallery, failures) if is_single else []
-    body = [*before, *shown, *_waveforms(figures or groups, gallery, progress), *after]
+    body = [*before, *shown, *_waveforms(drawn, len(groups), progress), *after]
     body += tables.claims_parts(evaluate(assessable_runs(runs)))
     effects = first.effects if first else effects_of(groups, quick_maps)
     if effects:
@@ -179,15 +185,13 @@ def page_of(
     parts: list[Part] = [contents(body), *caveats, *body]
     verdict: list[str] = []
     if first:
-        own = _first_parts(first, gallery)
-        spatial = _spatial_parts(first, gallery, failures)
         if is_single:
             verdict = sentences(first)
             parts = [four_numbers(first), parts[0], *own[:-1], *spatial, own[-1], *parts[1:]]
         else:
             verdict = [*overview.sentences(effects, groups), *sentences(first)[1:]]
-            drawn = overview.figure(effects, gallery.style)
-            numbers = gallery.figure("numbers", drawn, overview.ABOUT)
+            dots = overview.figure(effects, gallery.style)
+            numbers = gallery.figure("numbers", dots, overview.ABOUT)
             detail = Section(f"One of them: {first.kernel.tacton}", own)
             parts = [overview.table(effects), numbers, parts[0], *spatial, detail, *parts[1:]]
     verdict = [" ".join(verdict)] if verdict else []
@@ -245,21 +249,34 @@ def _efforts_by_body(runs: Sequence[Run]) -> dict[str, Effort]:
     }  # fmt: skip
 
 
-def _waveforms(
-    groups: Mapping[str, Sequence[Run]], gallery: Gallery, progress: Progress
-) -> list[Part]:
+def _drawn(groups: Mapping[str, Sequence[Run]], gallery: Gallery) -> Iterator[dict[str, Picture]]:
+    """Yield the figures of each Tacton by their titles, the first one first."""
+    files = dict(zip(groups, distinct_names(groups), strict=True))
+    names = sorted(groups, key=lambda each: each != first_name(groups))
+    draw = gallery.workers.map if gallery.workers else map
+    one = partial(_tacton_pictures, replace(gallery, workers=None), len(groups) == 1)
+    return iter(draw(one, names, map(files.get, names), map(groups.get, names)))
+
+
+def _tacton_pictures(
+    gallery: Gallery, is_single: bool, name: str, file: str, group: Sequence[Run]
+) -> dict[str, Picture]:
+    """Return the waveforms and spectra of a Tacton and, of a single one, its sensation levels."""
+    runs, title = list(group), "waveforms and spectra" if is_single else name
+    figure = tacton_figure(name, runs, gallery.style)
+    pictures = {title: gallery.figure(file, figure, _caption(name, runs))}
+    if is_single and any(run.response.record.of_body for run in runs):
+        figure = levels_figure(runs, strongest_probe(runs), gallery.style)
+        pictures["sensation levels"] = gallery.figure("sensation", figure, SENSATION)
+    return pictures
+
+
+def _waveforms(drawn: Iterator[dict[str, Picture]], count: int, progress: Progress) -> list[Part]:
     """Return a choice between the figures of Tactons."""
     options: dict[str, Part] = {}
-    files = dict(zip(groups, distinct_names(groups), strict=True))
-    for k, name in enumerate(sorted(groups, key=lambda each: each != first_name(groups))):
-        progress(f"draw {name}", k / len(groups))
-        runs = list(groups[name])
-        title = name if len(groups) > 1 else "waveforms and spectra"
-        figure = tacton_figure(name, runs, gallery.style)
-        options[title] = gallery.figure(files[name], figure, _caption(name, runs))
-        if len(groups) == 1 and any(run.response.record.of_body for run in runs):
-            figure = levels_figure(runs, strongest_probe(runs), gallery.style)
-            options["sensation levels"] = gallery.figure("sensation", figure, SENSATION)
+    for k, pictures in enumerate(drawn):
+        progress(f"draw {next(iter(pictures))}", k / count)
+        options |= pictures
     return [Section("Waveforms", [Choice("waveforms", options)])]
 
 

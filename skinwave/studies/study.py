@@ -14,6 +14,7 @@ from simple_model import Response
 from simple_model.load.tacton import repetition_frequencies
 from skinwave.bodies.flattened import flattened
 from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.live import html_file
 from skinwave.measure.comparison import (
     Measured,
     compare_measured,
@@ -58,6 +59,7 @@ from skinwave.system.processes import pool
 COMPLETENESS = (
     "flat-body-harmonic", "flat-body", "plate-modes-transient", "fem", "plate-modes-nonlinear",
 )  # fmt: skip
+LIVE = "live.html"
 SLOW = 3.0  # s: responses of slower models come last
 ABOUT = (
     "The point-kernel model of Lim, Seifi and Park (CHI EA '24, doi 10.1145/3613905.3650981) is "
@@ -109,26 +111,26 @@ def run_study(
     title: str,
     command: str,
     measured: Measured | None = None,
-    more: Sequence[document.Part] = (),
-    failures: Mapping[str, str] | None = None,
+    live: Sequence[Scene] = (),
 ) -> StudyOutcome:
     """Run every scene, write each run when it is finished, then write tables and page.
 
     Each body has one model: the given one, finite elements if their size is given, or the most
     complete one that plans choose for its scenes. A body of one scene is planned as by `run`; one
     of several has elements of the given size, of that in `paper15.SIZES`, or of the default size. A
-    measurement is compared with the models of its Tacton. `more` are further parts of the page;
-    `failures` are of parts made before. After an interrupt or a failure, the other runs are
-    compared and written; raises a ValueError if all fail.
+    measurement is compared with the models of its Tacton. `live` are the scenes of a live page.
+    After an interrupt or a failure, the other runs are compared and written; raises a ValueError if
+    all fail.
     """
     models = _models(scenes, options)
     started, planned = time.perf_counter(), sum(map(len, scenes.values()))
     progress = options.progress
     groups: dict[str, list[Run]] = {}
-    found, interrupted = Found(failures=dict(failures or {})), True
+    found, interrupted = Found(), True
     failed = found.failures
     options = replace(options, model="auto", progress=silent)
     with one_thread(), pool(2) as workers:
+        live_page = workers.submit(html_file.comparison_page, live)
         with suppress(KeyboardInterrupt):
             for run in _runs(scenes, models, options, progress, workers, found):
                 write_run(folder / run.tacton / run.column, run)
@@ -151,29 +153,38 @@ def run_study(
         if not interrupted:
             views = _views(scenes[first_name(scenes)], found.surfaces)
             first = first_screen(groups, found.maps, views, found.checks)
-    parts: list[document.Part] = [*more]
-    figures: dict[str, Sequence[Run]] = dict(groups)
-    conclusions: list[str] = []
-    for name, group in groups.items() if measured else ():
-        from skinwave.measure import comparison_page  # slow to import
+        parts: list[document.Part] = []
+        with or_failed(failed, "live page"):
+            html, why = live_page.result()
+            failed |= why
+            if html:
+                (folder / LIVE).write_text(html, encoding="utf-8")
+                parts.append(document.live_link(LIVE))
+        figures: dict[str, Sequence[Run]] = dict(groups)
+        conclusions: list[str] = []
+        for name, group in groups.items() if measured else ():
+            from skinwave.measure import comparison_page  # slow to import
 
-        assert measured
-        quantity = measured.measurement.quantity
-        comparison = compare_measured(
-            measured, [in_quantity(run, quantity, found.prepared) for run in group]
-        )
-        conclusions += [comparison_page.conclusion(comparison, c) for c in comparison.bodies]
-        comparison_page.write_tables(folder, comparison)
-        parts.append(comparison_page.page_section(comparison, Gallery().figure))
-        figures[name] = runs_to_draw(comparison)
-        first = replace(first, measured=measured_places(comparison)) if first else None
-    if interrupted:
-        parts.insert(0, f"Interrupted: this page shows the {len(runs)} finished of {planned} runs.")
-    page_of(
-        title, groups, first, Gallery(), figures=figures, progress=progress, before=parts,
-        modelled=[ABOUT], seconds=time.perf_counter() - started, command=command, failures=failed,
-        notes=["For one run: skinwave run TACTON/BODY/scene.toml in this folder."],
-    ).write(folder)  # fmt: skip
+            assert measured
+            quantity = measured.measurement.quantity
+            comparison = compare_measured(
+                measured, [in_quantity(run, quantity, found.prepared) for run in group]
+            )
+            conclusions += [comparison_page.conclusion(comparison, c) for c in comparison.bodies]
+            comparison_page.write_tables(folder, comparison)
+            parts.append(comparison_page.page_section(comparison, Gallery().figure))
+            figures[name] = runs_to_draw(comparison)
+            first = replace(first, measured=measured_places(comparison)) if first else None
+        if interrupted:
+            parts.insert(
+                0, f"Interrupted: this page shows the {len(runs)} finished of {planned} runs."
+            )
+        page_of(
+            title, groups, first, Gallery(workers=workers), figures=figures, progress=progress,
+            before=parts, modelled=[ABOUT], seconds=time.perf_counter() - started,
+            command=command, failures=failed,
+            notes=["For one run: skinwave run TACTON/BODY/scene.toml in this folder."],
+        ).write(folder)  # fmt: skip
     return StudyOutcome(
         assessed_claims=assessed_claims, warnings=document.worst_warnings(efforts_of(runs)),
         failures=failed, runs=len(runs), planned=planned, seconds=time.perf_counter() - started,
