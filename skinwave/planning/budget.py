@@ -9,7 +9,7 @@ supported sheet is solved by the modes of a linear plate. For a body from a file
 depend on its sides, and a curled sheet, only the uncertainty due to the pressure is known.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 
@@ -80,61 +80,56 @@ class ErrorBudget:
 
 def error_budget(scene: Scene, numerical: float = nan) -> ErrorBudget:
     """Return the error budget of a response with a `numerical` relative error."""
-    spreads = spreads_of(scene)
-    of_material = [s for s in spreads if s.part == "material"]
-    of_device = [s for s in spreads if s.part != "material"]
-    (material, why), (device, too) = (
-        _uncertainty(scene, each) for each in (of_material, of_device)
-    )
-    return ErrorBudget(numerical=numerical, material=material, device=device, reason=why or too)
+    spreads, reason = spreads_of(scene), ""
+    found = {"material": 0.0, "device": 0.0}
+    for part in found:
+        own = [spread for spread in spreads if (spread.part == "material") == (part == "material")]
+        try:
+            squares = [_change(scene, spread) ** 2 for spread in own]
+            found[part] = float(np.sqrt(np.max(np.sum(squares, axis=0))))
+        except ValueError as error:
+            found[part], reason = nan, reason or str(error)
+    return ErrorBudget(numerical=numerical, reason=reason, **found)
 
 
-def _uncertainty(scene: Scene, spreads: Sequence[Spread]) -> tuple[float, str]:
-    """Return the uncertainty of the worst probe's waveform, or nan and why it is not computed."""
-    changes: list[Floats] = []
-    for spread in spreads:
-        low, high = spread.distribution.quantile(spread.value, SIGMA)
-        if spread.key == PRESSURE:
-            changes.append(np.full(len(scene.probes), (high - low) / (2 * spread.value)))
-            continue
-        change = _change(scene, spread.key, (float(low), float(high)))
-        if isinstance(change, str):
-            return nan, change
-        changes.append(change)
-    total = float(np.sqrt(np.sum(np.square(changes), axis=0)).max()) if changes else 0.0
-    return total, ""
+def _change(scene: Scene, spread: Spread) -> Floats:
+    """Return the relative change (p,) of the motion by one standard deviation of a number.
 
-
-def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | str:
-    """Return half the relative change (p,) of the motion between two values, or why not."""
+    Raises a ValueError if it is not computed.
+    """
+    key, ends = spread.key, spread.distribution.quantile(spread.value, SIGMA).tolist()
+    if key == PRESSURE:
+        return np.full(len(scene.probes), (ends[1] - ends[0]) / (2 * spread.value))
     lines_of = _closed_form(scene)
-    if isinstance(lines_of, str):
-        return lines_of
     if lines_of is _lines_of_layers and key.startswith(NOT_IN_LAYERS):
-        return f"flat layers do not depend on {key}"
+        raise ValueError(f"flat layers do not depend on {key}")
     try:
         lines = [lines_of(scene), *(lines_of(with_values(scene, {key: end})) for end in ends)]
     except (ValueError, ArithmeticError):  # a number out of range, or almost no loss
-        return f"there is no response at one standard deviation of {key}"
+        raise ValueError(f"there is no response at one standard deviation of {key}") from None
     (f, centre), (f_low, low), (f_high, high) = lines
     if not (np.array_equal(f, f_low) and np.array_equal(f, f_high)):
-        return f"lines of the load depend on {key}"
+        raise ValueError(f"lines of the load depend on {key}")
     return relative_changes((high - low) / 2, centre)
 
 
-def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]] | str:
-    """Return the function that computes a scene's steady lines, or why there is none."""
+def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]]:
+    """Return the function that computes a scene's steady lines; raise a ValueError without one."""
     body = scene.body
     if not any(solid.has_loss for _, solid in body.strata):
-        return "the body has no loss"
+        raise ValueError("the body has no loss")
     if scene.tacton.trajectory.shape == "recorded":
-        return "the path is recorded"
+        raise ValueError("the path is recorded")
     if body.of_kind.is_plate:
-        return _lines_of_plate if takes(MODES, scene) else "the sheet has no modes of a flat plate"
+        if not takes(MODES, scene):
+            raise ValueError("the sheet has no modes of a flat plate")
+        return _lines_of_plate
     if body.of_kind.dispersion is None:
-        return f"a {body.kind} has no flat layers; skinwave run --samples samples its elements"
+        raise ValueError(
+            f"a {body.kind} has no flat layers; skinwave run --samples samples its elements"
+        )
     if not (scene.reading.is_plain and scene.load.is_normal):
-        return "only for the displacement under a normal load"
+        raise ValueError("only for the displacement under a normal load")
     return _lines_of_layers
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshes import TetMesh
-from meshes.tetmesh import facet_set
 from simple_model import Effort, Response, Statement
 from simple_model.choices import choose
 from simple_model.drawing import new_axes
@@ -31,8 +30,7 @@ from skinwave.report.films import Film, check_format, film
 from skinwave.report.palette import SIGNED
 from skinwave.report.render import CAMERAS
 from skinwave.report.styles import style
-from skinwave.results.exports import PARAVIEW_ORDER, collection
-from skinwave.results.files import folder_name
+from skinwave.results.exports import PARAVIEW_ORDER, check_new, write_collection
 from skinwave.results.motion import (
     BodyMotion,
     check_values,
@@ -42,7 +40,7 @@ from skinwave.results.motion import (
     strain_from_rest,
     whole_motion,
 )
-from skinwave.results.outputs import output_file, output_path
+from skinwave.results.outputs import output_path
 from skinwave.results.views import motion_view, split
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning, silent
@@ -169,10 +167,8 @@ class Field:
         from matplotlib.tri import Triangulation
 
         k, ax = self.frame(time), new_axes(ax)
-        facets = facet_set(self.mesh, "top")
-        surface, local = np.unique(facets, return_inverse=True)
-        local = local.reshape(facets.shape)
-        triangles = split(local) if facets.shape[1] == 6 else local
+        surface, local = np.unique(self.mesh.facets["top"], return_inverse=True)
+        triangles = split(local.reshape(-1, 6))
         pushed = -DISPLACEMENT.per_unit * self.displacement[:, surface, 2]
         limit = float(np.abs(pushed).max()) or 1.0
         x, y = 1e3 * self.mesh.points[surface, :2].T
@@ -207,12 +203,7 @@ class Field:
         path, times = Path(path), self._some(frames).tolist()
         if path.suffix != ".pvd":
             raise ValueError(f"'{path.name}' must end in .pvd")
-        names = [f"{folder_name(path.stem)}_{k:04d}.vtu" for k in range(len(times))]
-        _check_new([path, *(path.parent / name for name in names)], overwrite)
-        for name, grid in zip(names, self.grids(times), strict=True):
-            grid.save(path.parent / name)
-        with output_file(path, overwrite=overwrite) as file:
-            file.write(collection(names, times).encode())
+        write_collection(path, self.grids(times), times, overwrite=overwrite)
         return path
 
     def animate(
@@ -240,7 +231,7 @@ class Field:
         with TemporaryDirectory() as folder, progress_callback(progress) as report:
             target = Path(path or Path(folder, "film.gif"))
             check_format(target)
-            _check_new([target], overwrite)
+            check_new([target], overwrite)
             view = motion_view(self.scene, kind, self.moved, shown.times, shown.displacement)
             with output_path(target, overwrite=overwrite) as aside:
                 film(aside, [view], style("report"), report, camera=camera)
@@ -253,12 +244,6 @@ class Field:
         count = len(self.times)
         chosen = np.unique(np.linspace(0, count - 1, min(frames or count, count)).round())
         return self.times[chosen.astype(int)]
-
-
-def _check_new(paths: Sequence[Path], overwrite: bool) -> None:
-    existing = [path for path in paths if path.exists()]
-    if existing and not overwrite:
-        raise ValueError(f"{existing[0]} exists. Give another name or overwrite=True")
 
 
 def field(

@@ -1,6 +1,6 @@
 """Results for other programs: tables, sound, and fields that ParaView opens."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 from simple_model import Response
 from simple_model.load.sampling import step
 from skinwave.results.files import folder_name
+from skinwave.results.outputs import output_file
 from skinwave.results.views import View, field_frames
 from skinwave.system.table import Table
 
@@ -58,12 +59,9 @@ def write_field(folder: Path, view: View) -> Path:
     are about their mean; the field data `units` names the units.
     """
     frames = field_frames(len(view.times)) if view.tensors is None else view.tensors.frames
-    names, stem = [], folder_name(view.column)
-    for k, frame in enumerate(frames.tolist()):
-        names.append(f"{stem}_{k:03d}.{'vtu' if len(view.tets) else 'vtp'}")
-        _grid(view, frame, k).save(folder / names[-1])
-    path = folder / f"{stem}.pvd"
-    path.write_text(collection(names, view.times[frames].tolist()), encoding="utf-8")
+    grids = (_grid(view, frame, k) for k, frame in enumerate(frames.tolist()))
+    path = folder / f"{folder_name(view.column)}.pvd"
+    write_collection(path, grids, view.times[frames].tolist(), "vtu" if len(view.tets) else "vtp")
     return path
 
 
@@ -78,9 +76,7 @@ def _grid(view: View, frame: int, number: int) -> Any:
     tensors, nodes, tets = view.tensors, np.arange(len(view.points)), view.tets
     if tensors is not None:
         nodes, tets = tensors.nodes, tensors.tets
-    cells = np.insert(tets, 0, 10, axis=1).ravel()
-    kinds = np.full(len(tets), pv.CellType.QUADRATIC_TETRA)
-    grid = pv.UnstructuredGrid(cells, kinds, view.points[nodes])
+    grid = pv.UnstructuredGrid({pv.CellType.QUADRATIC_TETRA: tets}, view.points[nodes])
     grid["displacement_m"] = view.motion[frame][nodes]
     if tensors is not None:
         grid["strain"] = tensors.strain[number][:, PARAVIEW_ORDER]
@@ -89,13 +85,32 @@ def _grid(view: View, frame: int, number: int) -> Any:
     return grid
 
 
-def collection(names: Sequence[str], times: Sequence[float]) -> str:
-    """Return a ParaView collection of files at times in s."""
+def write_collection(
+    path: Path, grids: Iterable[Any], times: Sequence[float], suffix: str = "vtu",
+    *, overwrite: bool = False,
+) -> None:  # fmt: skip
+    """Write a ParaView collection, and beside it a file of each grid of pyvista, at times in s.
+
+    Raises a ValueError if a file exists and `overwrite` is False.
+    """
+    names = [f"{folder_name(path.stem)}_{k:04d}.{suffix}" for k in range(len(times))]
+    check_new([path, *(path.parent / name for name in names)], overwrite)
+    for name, grid in zip(names, grids, strict=True):
+        grid.save(path.parent / name)
     rows = "".join(
         f'<DataSet timestep="{t:.9g}" group="" part="0" file="{name}"/>\n'
         for t, name in zip(times, names, strict=True)
     )
-    return (
+    text = (
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n'
         f"<Collection>\n{rows}</Collection>\n</VTKFile>\n"
     )
+    with output_file(path, overwrite=overwrite) as file:
+        file.write(text.encode())
+
+
+def check_new(paths: Sequence[Path], overwrite: bool) -> None:
+    """Raise a ValueError if a file exists and `overwrite` is False."""
+    existing = [path for path in paths if path.exists()]
+    if existing and not overwrite:
+        raise ValueError(f"{existing[0]} exists. Give another name or overwrite=True")
