@@ -142,14 +142,13 @@ def without(
     scene: Scene,
     dropped: Collection[str],
     *,
-    update_rate: float = DEVICE_RATES[0],
-    points: int | None = None,
+    path: Trajectory | None = None,
     h: float | None = None,
 ) -> tuple[Scene, str]:
     """Return a scene without the dropped assumptions, and the model that a plan takes for it: one
     without reflections from the sides for an infinite body, one with them for any other.
 
-    `update_rate` and `points` are those of `device_path`, h in m is that of `element_size`.
+    `path` is that of the device, by default `device_path`, h in m is that of `element_size`.
     Assumptions on the load are the same with and without propagation.
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
@@ -158,7 +157,7 @@ def without(
     drive = own if "linear drive" in dropped else PUBLISHED
     pressure = replace(scene.pressure, profile=profile, drive=drive)
     if "continuous path" in dropped:
-        path = device_path(scene.tacton.trajectory, update_rate, points)
+        path = path or device_path(scene.tacton.trajectory)
         pressure = replace(pressure, tacton=replace(scene.tacton, trajectory=path))
     if "no propagation" not in dropped:
         kernel = point_kernel.SAME_LOAD if dropped else point_kernel.PUBLISHED

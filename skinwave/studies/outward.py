@@ -21,20 +21,17 @@ AXES = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outward:
-    """Probes on a line that leaves the path `towards` +x, -x, +y or -y.
-
-    `distances` (k,) in m are those from the path, `index` (k,) the numbers of these probes among
-    all `probes`, which begin with those of the scene.
+    """Probes (k, 2) in m on a line that leaves the path `towards` +x, -x, +y or -y, and their
+    `distances` (k,) in m from the path.
     """
 
-    probes: tuple[tuple[float, float], ...]
+    probes: Floats
     towards: str
     distances: Floats
-    index: list[int]
 
     def reach(self, levels: Floats) -> Reach | None:
-        """Return how far levels (p,) in dB at all probes are above 0; None if not at the path."""
-        level = np.maximum(levels[self.index], LOWEST)
+        """Return how far levels (k,) in dB at the probes are above 0; None if not at the path."""
+        level = np.maximum(levels, LOWEST)
         below = np.flatnonzero(level <= 0)
         if not len(below):
             return Reach(metre=float(self.distances[-1]), beyond=True)
@@ -66,13 +63,7 @@ def outward(scene: Scene, body: Body, h: float) -> Outward | None:
     end = INNER * steps[-1] if len(off) else FARTHEST
     distances = min(UNIT, end / 4) * PLACED
     distances = np.append(distances[distances < 0.9 * end], end)
-    every, index = list(scene.probes), []
-    for place in start + distances[:, None] * axis:
-        apart = np.linalg.norm(np.array(every) - place, axis=1)
-        index.append(int(np.argmin(apart)) if apart.min() < SAME else len(every))
-        if index[-1] == len(every):
-            every.append((float(place[0]), float(place[1])))
-    return Outward(probes=tuple(every), towards=towards, distances=distances, index=index)
+    return Outward(probes=start + distances[:, None] * axis, towards=towards, distances=distances)
 
 
 def _on_body(body: Body, places: Floats, h: float) -> np.ndarray:

@@ -199,8 +199,9 @@ def hierarchy_of(
     check_motion(scene, "relax")
     names = droppable(scene)
     check_rate(update_rate)
+    path = scene.tacton.trajectory
     if "continuous path" in names:
-        device_path(scene.tacton.trajectory, update_rate, points)  # raises before computing
+        path = device_path(path, update_rate, points)
     up = [(FIRST, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
     side = [(dropped[-1], dropped)] if (dropped := side_step(scene)) else []
     others = [(name, tuple(n for n in names if n != name)) for name in names]
@@ -215,7 +216,7 @@ def hierarchy_of(
         step = HierarchyStep(name=name, dropped=dropped, model="none")
         changed = scene
         try:
-            changed, model = without(scene, dropped, update_rate=update_rate, points=points, h=h)
+            changed, model = without(scene, dropped, path=path, h=h)
             step = replace(step, model=named(model).name, body=changed.body)
         except REASONS as error:
             step = replace(step, error=reason(error))
@@ -223,7 +224,7 @@ def hierarchy_of(
         scenes.append(changed)
     steps = _with_shared_models(steps, scenes, len(up))
     line = _outward(scene, scenes[len(up) - 1].body, element_size(scene, h))
-    probes = line.probes if line else scene.probes
+    probes = (*scene.probes, *map(tuple, line.probes.tolist())) if line else scene.probes
     submitted: list[Future[tuple[Response, float, int]] | None] = []
     with (
         TemporaryDirectory(prefix="skinwave-") as cache,
@@ -322,7 +323,8 @@ def _compute(
     if scene.body.is_skin:
         levels = levels_at_probes(scene, whole)
         step = replace(
-            step, level=float(levels[:count].max()), reach=line.reach(levels) if line else None
+            step, level=float(levels[:count].max()),
+            reach=line.reach(levels[count:]) if line else None,
         )
     same = (s for s in before if s.response and (s.body, s.model) == (step.body, step.model))
     if (first := next(same, None)) and first.response:

@@ -114,7 +114,7 @@ def test_a_device_rests_on_equally_spaced_points():
     np.testing.assert_allclose(np.diff(path.times), 1 / PATH.drawing_frequency / 5, rtol=1e-9)
     late = path.position(0.99 * path.times[1] * np.ones(1))
     np.testing.assert_allclose(late[0], corners[0], atol=1e-12)
-    scene, model = without(SKIN, ("no propagation", "continuous path"), points=5)
+    scene, model = without(SKIN, ("no propagation", "continuous path"), path=path)
     assert (scene.tacton.trajectory, model) == (path, "fem")
 
 
