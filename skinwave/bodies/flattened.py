@@ -11,7 +11,7 @@ from meshes.facets import heights_over
 from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build, build
-from skinwave.bodies.parts import FLAT, PHALANX, PLAIN, Layer
+from skinwave.bodies.parts import FLAT, Layer
 from skinwave.typing import Floats, Ints
 
 RIGID = 100.0  # shear modulus over that of the tissue above, from which a stratum holds it
@@ -33,21 +33,20 @@ def flattened(body: Body, places: Floats, h: float) -> Body:
         flat = replace(body.mounting, curl_x=0.0, curl_y=0.0)
         return replace(body, mounting=flat, placement=FLAT)
     width, height = np.maximum([body.width, body.height], 2 * np.abs(places).max(axis=0)).tolist()
-    slab = {
-        "kind": "slab", "sides": "absorbing", "placement": FLAT, "relief": PLAIN, "bone": PHALANX,
-        "file": "", "unit": "m", "up": "+z", "regions": (), "width": width, "height": height,
-    }  # fmt: skip
-    if "regions" not in body.of_kind.keys:
-        return replace(body, **slab)
-    column = _column(body, places[0], h)
-    stiffness = [solid.shear_modulus + solid.fast_modulus for _, solid in column]
-    held = [k for k in range(1, len(column)) if stiffness[k] > RIGID * stiffness[k - 1]]
-    if held:
-        column, slab["base"], slab["base_stiffness"] = column[: held[0]], "clamped", 0.0
-    layers = tuple(Layer(thickness=thickness, material=solid) for thickness, solid in column)
-    depth = sum(layer.thickness for layer in layers)
-    slab |= {"layers": layers[:-1], "material": layers[-1].material, "depth": depth}
-    return replace(body, **slab)
+    base, stiffness, depth = body.base, body.base_stiffness, body.depth
+    layers, material = body.layers, body.material
+    if "regions" in body.of_kind.keys:
+        column = _column(body, places[0], h)
+        moduli = [solid.shear_modulus + solid.fast_modulus for _, solid in column]
+        held = [k for k in range(1, len(column)) if moduli[k] > RIGID * moduli[k - 1]]
+        if held:
+            column, base, stiffness = column[: held[0]], "clamped", 0.0
+        depth, material = sum(thickness for thickness, _ in column), column[-1][1]
+        layers = tuple(Layer(thickness=part, material=solid) for part, solid in column[:-1])
+    return Body(
+        width=width, height=height, depth=depth, material=material, layers=layers, base=base,
+        base_stiffness=stiffness, sides="absorbing",
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=8)

@@ -71,10 +71,12 @@ def droppable(scene: Scene) -> tuple[str, ...]:
             "no assumption can be dropped without a body. Give the scene one under [body]"
         )
     sheet, slab = body.of_kind.is_plate, body.of_kind.is_layer
+    is_flat = slab and body.placement == FLAT
+    is_infinite = body.sides == "absorbing" and (sheet or is_flat)
     conditions = {
         "little loss": any(solid.has_loss for solid in body.solids),
         "viscous loss": any(solid.fast_modulus > 0 for solid in body.solids),
-        "laterally-infinite": body.sides != "absorbing" if sheet else not _is_infinite(scene),
+        "laterally-infinite": not (is_infinite or (is_flat and body.depth == np.inf)),
         "one material": bool(body.layers)
         or (slab and sum(x.thickness for x in LAYERS) < body.depth < np.inf),
         "alike in all directions": sheet and isotropic_sheet(body) != body,
@@ -83,17 +85,10 @@ def droppable(scene: Scene) -> tuple[str, ...]:
         and not path.is_static,
         "rigid base": body.base == "elastic",
         # A thin body has no room for the mounds of the palm.
-        "flat": slab and body.placement == FLAT and Palm.thenar_height < body.depth < np.inf,
+        "flat": is_flat and Palm.thenar_height < body.depth < np.inf,
         "small deflection": sheet and takes(STRETCHED, scene),
     }
     return tuple(name for name in ASSUMPTIONS if conditions.get(name, True))
-
-
-def _is_infinite(scene: Scene) -> bool:
-    """Whether a solid is flat without reflecting sides, as it is before its own shape is used."""
-    body = scene.body
-    flat = body.of_kind.is_layer and body.placement == FLAT
-    return flat and (body.sides == "absorbing" or body.depth == np.inf)
 
 
 def side_step(scene: Scene) -> tuple[str, ...]:

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -161,13 +160,9 @@ class Hierarchy:
 
     def pairs(self) -> list[tuple[HierarchyStep, HierarchyStep]]:
         """Return pairs of computed steps that differ by one assumption."""
-        pairs = [(a, b) for a, b in pairwise(self.steps) if a.response and b.response]
-        for step in self.side_steps:
-            fewer = set(step.dropped) - {step.name}
-            before = next((r for r in self.steps if r.response and set(r.dropped) == fewer), None)
-            if step.response and before:
-                pairs.append((before, step))
-        return pairs
+        made = {step.dropped: step for step in self.steps if step.response}
+        later = [step for step in (*self.steps[1:], *self.side_steps) if step.response]
+        return [(made[s.dropped[:-1]], s) for s in later if s.dropped[:-1] in made]
 
     def effects(self) -> list[Effect]:
         """Return the effect of each assumption, the largest first, without failed steps."""
@@ -204,12 +199,10 @@ def hierarchy_of(
         path = device_path(path, update_rate, points)
     up = [(FIRST, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
     side = [(dropped[-1], dropped)] if (dropped := side_step(scene)) else []
-    others = [(name, tuple(n for n in names if n != name)) for name in names]
-    leave_one_out = [
-        (f"all but: {name}", dropped)
-        for name, dropped in others
-        if dropped not in [each for _, each in up] and can_be_alone(name, names, scene, h)
-    ]
+    leave_one_out = [  # except the last, which is a step
+        (f"all but: {name}", tuple(n for n in names if n != name))
+        for name in names[:-1] if can_be_alone(name, names, scene, h)
+    ]  # fmt: skip
     steps: list[HierarchyStep] = []
     scenes: list[Scene] = []
     for name, dropped in (*up, *side, *leave_one_out):
@@ -323,7 +316,8 @@ def _compute(
     if scene.body.is_skin:
         levels = levels_at_probes(scene, whole)
         step = replace(
-            step, level=float(levels[:count].max()),
+            step,
+            level=float(levels[:count].max()),
             reach=line.reach(levels[count:]) if line else None,
         )
     same = (s for s in before if s.response and (s.body, s.model) == (step.body, step.model))
