@@ -1,7 +1,7 @@
 """Picture of a meshed body at rest: its boundary conditions, its regions, the focus and the probes.
 
-Bodies of several materials are cut open at x > 0, y < 0. Lengths are in mm, and the camera has no
-perspective.
+Bodies of several materials are cut open at larger x and smaller y than the origin. Lengths are in
+mm, and the camera has no perspective.
 """
 
 import re
@@ -15,7 +15,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from fem.load_and_probe import facet_normals
-from meshes.tetmesh import boundary_facets, facet_keys
+from meshes.tetmesh import boundary_facets, facet_keys, part
 from skinwave.bodies.body import Body, body_name
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import coarsest_size, default_size, layer_name, meshed_strata
@@ -46,7 +46,6 @@ CAMERA = (0.55, -1.0, 0.7)  # direction to the camera
 # Lengths over the largest side of the body: the arrow to the device, the gap below it, and the
 # thickness of the support that is drawn below the body.
 ARROW, GAP, PLATE = 0.16, 0.05, 0.02
-LEAST_SHARE = 0.1  # of a support: where it is weaker, the surface is drawn as free
 EDGE = "#5a5f66"  # colour of the edges of elements
 STEEP = -0.7  # vertical component of the normal of a base, at most
 FRONT, SECTION = 0.05, 241  # mm, of thin layers before a section; points along it
@@ -59,16 +58,15 @@ LIT: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.6}
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshedBody:
     """What is drawn of a meshed body: its points (n, 3) in mm, the tetrahedra (m, 10) outside the
-    absorbing layer with their regions (m,), the facets (k, 6) on their boundary with outward
-    normals (k, 3), the name of the condition of each and its share (k,), the upper facets (j, 6),
-    names of regions, and names and thicknesses in mm of the layers of the coat.
+    absorbing layer with their regions (m,), the facets (k, 6) on their boundary with the name of
+    the condition of each and its share (k,), the upper facets (j, 6), names of regions, and names
+    and thicknesses in mm of the layers of the coat.
     """
 
     points: Floats
     tets: Ints
     region: Ints
     facets: Ints
-    normals: Floats
     conditions: Array
     shares: Floats
     top: Ints
@@ -79,6 +77,12 @@ class MeshedBody:
     def is_cut(self) -> bool:
         """Whether it is cut open to show its materials."""
         return len(np.unique(self.region)) > 1 or len(self.coat) > 0
+
+    @property
+    def corner(self) -> Floats:
+        """Place (2,) where it is cut open: the origin, or the middle of a body beside it."""
+        low, high = self.points[:, :2].min(axis=0), self.points[:, :2].max(axis=0)
+        return np.zeros(2) if len(self.on_top(np.zeros((1, 2)))) else (low + high) / 2
 
     @property
     def colours(self) -> dict[str, str]:
@@ -109,16 +113,15 @@ def meshed_body(body: Body) -> MeshedBody:
     h = drawn_size(body)
     build = mesh_body(body, h, Clock(), silent)
     mesh, drag, coat = build.mesh, build.drag, build.coat
-    inside = np.ones(len(mesh.tets), bool) if drag is None else drag == 0
-    facets = boundary_facets(mesh.tets[inside])
-    conditions, shares = _conditions(body, build, facets)
+    own_mesh, nodes = part(mesh, np.ones(len(mesh.tets), bool) if drag is None else drag == 0)
+    facets = boundary_facets(own_mesh.tets)
+    conditions, shares = _conditions(body, build, nodes[facets])
     own = body.material if isinstance(body.material, str) else "material"
     names = [own if x == body.solid else layer_name(body, x) for _, x in meshed_strata(body, h)]
     layers = zip(coat.materials, coat.thicknesses, strict=True) if coat else ()
     return MeshedBody(
-        points=1e3 * mesh.points, tets=mesh.tets[inside], region=mesh.region[inside],
-        facets=facets, normals=facet_normals(mesh, facets).reshape(len(facets), -1, 3)[:, 0],
-        conditions=conditions, shares=shares, top=mesh.facets["top"],
+        points=1e3 * own_mesh.points, tets=own_mesh.tets, region=own_mesh.region,
+        facets=facets, conditions=conditions, shares=shares, top=own_mesh.facets["top"],
         names=dict(enumerate([*names, *(name for name, _ in body.regions)])),
         coat=[(layer_name(body, solid), 1e3 * thickness) for solid, thickness in layers],
     )  # fmt: skip
@@ -145,14 +148,14 @@ def _conditions(body: Body, build: Build, facets: Ints) -> tuple[Array, Floats]:
             each.reshape(len(support.facets), -1).mean(axis=1) for each in (held, support.absorbed)
         )
         for name, share in ((SPRINGS, springs), (ABSORBING, dashpots)):
-            acts = (share > LEAST_SHARE) & (share == np.maximum(springs, dashpots))
+            acts = (share > 0) & (share == np.maximum(springs, dashpots))
             mark(name, support.facets[acts], share[acts])
     for name, components in build.fixed.items():
         if components == "xyz":
             mark(CLAMPED, mesh.facets[name])
     if build.held is not None:
         simply = body.mounting.support == "simply"
-        at_rest = build.held.any(axis=1)[facets[:, :3]].all(axis=1)
+        at_rest = np.asarray(build.held.any(axis=1))[facets[:, :3]].all(axis=1)
         found[at_rest] = SIMPLE if simply else CLAMPED
     return found, shares
 
@@ -197,10 +200,10 @@ def _render(
     import pyvista as pv
 
     letter, is_plate = render.LETTERS / 72 * size[0] / inch, scene.body.of_kind.is_plate
-    outside = drawn.points[np.unique(drawn.facets)]
-    side = float(np.ptp(outside, axis=0).max())
-    below = drawn.on_top(np.zeros((1, 2)))
-    foot = np.array([0.0, 0.0, (below if len(below) else outside)[:, 2].max() + GAP * side])
+    side = float(np.ptp(drawn.points, axis=0).max())
+    below = drawn.on_top(drawn.corner[None])
+    top = (below if len(below) else drawn.points)[:, 2].max()
+    foot = np.array([*drawn.corner, top + GAP * side])
     tip = foot + [0.0, 0.0, ARROW * side]
     with render.new_plotter(style, size) as plotter:
         plotter.enable_anti_aliasing("ssaa")  # draws at `SCALE` times the size
@@ -216,11 +219,12 @@ def _render(
         plotter.add_mesh(edges, color=EDGE, opacity=0.2, line_width=letter / 12)
         for name in set(drawn.conditions) - {FREE}:
             held = drawn.conditions == name
-            base = drawn.facets[held & (drawn.normals[:, 2] < STEEP)]
+            mark = pv.PolyData.from_regular_faces(drawn.points, split(drawn.facets[held]))
+            base = mark.face_normals[:, 2] < STEEP
             if is_plate:  # its sides are too thin to see
                 mark = _edges(drawn, drawn.facets[held])
-            elif len(base):
-                mark = pv.PolyData.from_regular_faces(drawn.points, split(base))
+            elif base.any():
+                mark = mark.extract_cells(base).extract_surface(algorithm="dataset_surface")
                 mark = _opened(mark.extrude((0.0, 0.0, -PLATE * side), capping=True), drawn)
             else:
                 continue
@@ -238,13 +242,14 @@ def _render(
             start=foot, direction=tip - foot, scale="auto", shaft_radius=0.03, tip_radius=0.09
         )
         plotter.add_mesh(arrow, color=ORANGE, **LIT)
-        render.add_label(plotter, "  to the device, +z", tip, letter, style.ink)
-        render.add_scale_bar(plotter, outside, style, letter)
+        render.add_label(plotter, "    to the device, +z", (foot + 3 * tip) / 4, letter, style.ink)
+        render.add_scale_bar(plotter, drawn.points, style, letter)
         name, words = label(body_name(scene.body)), scene.body.of_kind.words(scene.body)
         words = re.sub(r"(?<!\S)-(?=\w)", "\u2212", words.replace(" x ", " \u00d7 "))
         title = words if words.startswith(name) else f"{name}\n{words}"
-        render.write(plotter, title, (0.01, 0.9), letter, style.ink)
-        shown = np.vstack([outside, [foot, tip], render.scale_bar(outside)])
+        height = 1.3 * (1 + title.count("\n")) * letter / size[1]
+        render.write(plotter, title, (0.01, 0.98 - height), letter, style.ink)
+        shown = np.vstack([drawn.points, [foot, tip], render.scale_bar(drawn.points)])
         render.Projection.of(CAMERA, shown, size[0] / size[1]).apply(plotter)
         return np.asarray(plotter.screenshot(None, return_img=True))
 
@@ -257,8 +262,9 @@ def _edges(drawn: MeshedBody, facets: Ints) -> Any:
 
 
 def _opened(mesh: Any, drawn: MeshedBody) -> Any:
-    """Return a mesh without its part at x > 0, y < 0 if the body is cut open."""
-    return mesh.clip_box([0, FAR, -FAR, 0, -FAR, FAR], invert=True) if drawn.is_cut else mesh
+    """Return a mesh without its nearest corner if the body is cut open."""
+    x, y = drawn.corner
+    return mesh.clip_box([x, FAR, -FAR, y, -FAR, FAR], invert=True) if drawn.is_cut else mesh
 
 
 def _add_sections(plotter: Any, drawn: MeshedBody) -> None:
@@ -266,19 +272,19 @@ def _add_sections(plotter: Any, drawn: MeshedBody) -> None:
     import pyvista as pv
 
     body = pv.UnstructuredGrid({pv.CellType.QUADRATIC_TETRA: drawn.tets}, drawn.points)
-    shades = np.array([to_rgb(drawn.colours[drawn.names[k]]) for k in sorted(drawn.names)])
-    body["shade"] = (255 * shades[drawn.region]).astype(np.uint8)
+    regions, index = np.unique(drawn.region, return_inverse=True)
+    shades = np.array([to_rgb(drawn.colours[drawn.names[k]]) for k in regions.tolist()])
+    body["shade"] = (255 * shades[index]).astype(np.uint8)
+    x, y = drawn.corner
     # Normal of each section, the box it lies in, the place where it ends, and its front.
     for normal, box, end, front in (
-        ("y", (0, FAR, -FAR, FAR), (drawn.points[:, 0].max(), 0.0), (0.0, -FRONT, 0.0)),
-        ("x", (-FAR, FAR, -FAR, 0), (0.0, drawn.points[:, 1].min()), (FRONT, 0.0, 0.0)),
+        ("y", (x, FAR, -FAR, FAR), (drawn.points[:, 0].max(), y), (0.0, -FRONT, 0.0)),
+        ("x", (-FAR, FAR, -FAR, y), (x, drawn.points[:, 1].min()), (FRONT, 0.0, 0.0)),
     ):
-        section = body.slice(normal=normal, origin=(0, 0, 0))
-        if not section.n_cells:  # a body beside the origin
-            continue
+        section = body.slice(normal=normal, origin=(x, y, 0.0))
         section = section.clip_box((*box, -FAR, FAR), invert=False)
         plotter.add_mesh(section, scalars="shade", rgb=True, lighting=False)
-        along = drawn.on_top(np.linspace(0.0, 1.0, SECTION)[:, None] * end) + front
+        along = drawn.on_top(np.linspace(drawn.corner, end, SECTION)) + front
         for name, thickness in drawn.coat:
             layer = pv.lines_from_points(along).extrude((0.0, 0.0, -thickness), capping=False)
             plotter.add_mesh(layer, color=drawn.colours[name], lighting=False)

@@ -113,6 +113,7 @@ def new_plotter(style: Style, size: tuple[int, int], panels: int = 1) -> Iterato
     )  # fmt: skip
     try:
         plotter.set_background(style.paper)
+        plotter.theme.allow_empty_mesh = True  # of what lies beside a body, or was cut away
         yield plotter
     finally:
         plotter.close()
