@@ -13,8 +13,10 @@ from skinwave.commands.common import (
     metre,
     plan_of_command,
     result_folder,
+    solving,
     summarise,
     warn,
+    with_failures,
 )
 
 if TYPE_CHECKING:
@@ -60,19 +62,28 @@ def run(options: argparse.Namespace) -> int:
         if options.samples:
             more = _uncertainty(options, run, plan.h, folder, progress)
         command = record.command_entry(options)
-        write_run_page(folder, run, more, command["typed"])
+        solving_map = solving(options, progress, model=response.model)
+        failures = write_run_page(folder, run, more, command["typed"], options=solving_map)
         record.write(folder, command, scene=scene, response=response)
     effort = response.effort
     summary = {
-        "out": str(options.out), "model": response.model, "dofs": effort.dofs,
+        "out": str(options.out), "failures": failures, "model": response.model, "dofs": effort.dofs,
         "solver": effort.solver, "seconds": round(sum(effort.seconds.values()), 2),
     }  # fmt: skip
     summarise(
         options,
         summary | accuracy(response),
-        f"{response.model}: wrote {options.out}/index.html; expected error {effort.errors.words}",
+        " ".join(
+            with_failures(
+                failures,
+                [
+                    f"{response.model}: wrote {options.out}/index.html; expected error "
+                    f"{effort.errors.words}"
+                ],
+            )
+        ),
     )
-    return 0
+    return 1 if failures else 0
 
 
 def _uncertainty(

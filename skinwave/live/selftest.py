@@ -5,18 +5,21 @@ from typing import Any
 
 import numpy as np
 
+from fem.load_and_probe import on_surface
 from simple_model import SUPERPOSITIONS, MovingPressure, Tacton, Trajectory, even_phases
 from simple_model.layers.flat_body import steady_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.live.packs import pack_method
 from skinwave.live.radial import LOWEST
 from skinwave.live.values import control_values
+from skinwave.models.meshed import mesh_body
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import answer, components, prepare
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import STILL, Body, Scene
+from skinwave.system.effort import Clock, silent
 from skinwave.typing import Complex, Floats
 
 SEED = 15
@@ -28,6 +31,9 @@ SHAPES = ("point", "line", "circle", "triangle", "square")
 DRIVES = ("pressure_squared", "force_corrected", "linear")
 # Places in m at which the exact model of a body of elements is prepared.
 PLACES = ((0.0, 0.0), (0.006, -0.002), (-0.011, 0.007), (0.004, 0.016), (0.02, -0.012))
+
+FARTHEST = float(np.abs(PLACES).max())
+WITHIN, SHARES = 0.3, (1.0, 0.5, 0.25, 0.1)  # of the side of a body; sizes to try on other bodies
 
 Lines = Callable[[Scene], tuple[Floats, Complex]]
 Waveform = Callable[[Scene], Floats]
@@ -73,16 +79,27 @@ def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
         lines_of = _lines_of_layers if method == "radial" else _lines_of_sheet
         return lines_of, lambda scene: compute(scene, model).values[:, 0], ()
     size = SolveOptions(h=h or body.of_kind.interactive_size)
-    prepared = prepare(Scene(pressure=STILL, body=body, probes=PLACES), size)
+    places = _places_on(body)
+    prepared = prepare(Scene(pressure=STILL, body=body, probes=places), size)
 
     def index(scene: Scene) -> int:
-        return int(np.linalg.norm(np.array(PLACES) - scene.probes[0], axis=1).argmin())
+        return int(np.linalg.norm(np.array(places) - scene.probes[0], axis=1).argmin())
 
     def lines(scene: Scene) -> tuple[Floats, Complex]:
         motion = components(prepared, *scene.loads)
         return motion.frequencies, motion.lines[:, index(scene)]
 
-    return lines, lambda scene: answer(prepared, scene).values[:, index(scene)], PLACES
+    return lines, lambda scene: answer(prepared, scene).values[:, index(scene)], places
+
+
+def _places_on(body: Body) -> Places:
+    """Return `PLACES`, nearer to the origin on a body that does not reach as far."""
+    if body.of_kind.is_bounded:
+        shares = [min(1.0, WITHIN * min(body.width, body.height) / FARTHEST)]
+    else:
+        mesh = mesh_body(body, body.of_kind.interactive_size, Clock(), silent).mesh
+        shares = [s for s in SHARES if on_surface(mesh, s * np.array(PLACES)).all()]
+    return tuple((shares[0] * x, shares[0] * y) for x, y in PLACES)
 
 
 def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:

@@ -1,7 +1,8 @@
 """Expected error and warnings of a response that was computed on a given mesh.
 
-The error of a mesh is extrapolated from one with elements of twice the size, as in `refinement`,
-which costs a tenth as much and overestimates errors by up to a half.
+The error of a mesh is extrapolated from a coarser one, as in `refinement`. A requested element size
+is compared with the next coarser one. A default size is compared with one of twice the size, which
+costs a tenth as much and overestimates errors by up to a half.
 """
 
 from functools import lru_cache
@@ -20,7 +21,7 @@ from skinwave.typing import Array
 
 Coarser = tuple[float, ReducedBody]  # element size in m, and the body with it
 
-COARSE_RATIO = 2.0  # of the element size of the mesh to compare with
+COARSE_RATIO = 2.0  # of the element size of the mesh to compare with, over a default one
 
 
 def assess(
@@ -58,9 +59,15 @@ def assess(
     return stated(scene, response, statement, errors.element_warnings(scene, size))
 
 
-def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
-    """Return the element size in m that `assess` compares with, and the body on that mesh."""
-    other = _coarser_size(scene.body, options.h or default_size(scene.body))
+def coarser_body(
+    scene: Scene, options: SolveOptions = DEFAULT, usual: float | None = None
+) -> Coarser:
+    """Return the element size in m that `assess` compares with, and the body on that mesh. The
+    `usual` size in m is that of a study, in place of the default size.
+    """
+    body, h = scene.body, options.h
+    usual = usual or default_size(body)
+    other = refinement.comparison_size(body, h) if h else _coarser_size(body, usual)
     return other, _prepare(without_tacton(scene), other, options.solver, options.tolerance)
 
 
@@ -81,7 +88,7 @@ def all_warnings(
 
 
 def _coarser_size(body: Body, h: float) -> float:
-    """Return a size in m for a cheap comparison with h, if there is such a mesh."""
+    """Return a size in m for a cheap comparison with a default size, if there is such a mesh."""
     try:
         check_mesh(body, COARSE_RATIO * h)
     except ValueError:

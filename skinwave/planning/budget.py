@@ -52,10 +52,8 @@ class ErrorBudget:
     @property
     def words(self) -> str:
         """All three errors in one sentence."""
-        return (
-            f"Standard deviation of the waveform at the worst probe: {self.spreads}; "
-            f"numerical error {stated_error(self.numerical)}"
-        )
+        both = f"{self._clause('material', self.material)}, {self._clause('device', self.device)}"
+        return f"{both}; the numerical error is {stated_error(self.numerical)}"
 
     @property
     def spreads(self) -> str:
@@ -71,6 +69,14 @@ class ErrorBudget:
         known = {"material": self.material, "device": self.device}
         name = max(known, key=lambda each: known[each] if isfinite(known[each]) else -1.0)
         return (name, known[name]) if isfinite(known[name]) else ("", 0.0)
+
+    def _clause(self, name: str, value: float) -> str:
+        if not value:
+            return f"the spread of the {name} is not known"
+        if not isfinite(value):
+            return f"the uncertainty from the {name} is {self._percent(value)}"
+        changed = f"changes the waveform at the worst probe by {change_text(value)}"
+        return f"one standard deviation of the {name} {changed}"
 
     def _percent(self, value: float) -> str:
         if isfinite(value):

@@ -22,6 +22,7 @@ from simple_model.line_table import FREE
 from simple_model.numbers import interval, percent, significant
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.models import named
+from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report import description, render
 from skinwave.report.figures import REPORT, figure_file
@@ -48,9 +49,11 @@ from skinwave.studies.first_screen import (
     effects_of,
     first_name,
     first_screen,
+    has_quick_map,
     quick_maps,
     with_kernels,
 )
+from skinwave.studies.surfaces import Surface, element_surfaces, played, quick_surface, views_of
 from skinwave.system.document import (
     Choice,
     Details,
@@ -223,14 +226,33 @@ def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
     return [(name, run.response.effort) for name, run in zip(names, runs, strict=True)]
 
 
-def write_run_page(folder: Path, run: Run, more: Sequence[Part] = (), command: str = "") -> None:
-    """Write the folder of one run with its page, which may have more parts."""
+def write_run_page(
+    folder: Path, run: Run, more: Sequence[Part] = (), command: str = "", *,
+    options: SolveOptions = DEFAULT,
+) -> dict[str, str]:  # fmt: skip
+    """Write the folder of one run with its page, which may have more parts. Return the reasons of
+    parts that failed.
+    """
     fill(folder, run)
-    group = with_kernels(run) if run.is_motion and run.scene.load.is_plain else []
-    first = first_screen({run.tacton: group}, quick_maps)
+    first, failures = None, dict[str, str]()
+    if run.is_motion and run.scene.load.is_plain:
+        group = with_kernels(run)
+        scenes = {each.column: each.scene for each in group}
+        if has_quick_map(run.scene):
+            found, failures = quick_surface(run, None)
+        else:
+            options.progress(f"map of {run.column}", 0.0)
+            found, failures = element_surfaces(
+                run.column, {run.tacton: run.scene}, options, played(scenes)
+            )
+        surface = found.get((run.tacton, run.column), Surface())
+        first = first_screen({run.tacton: group}, lambda _: surface.maps, views_of(scenes, found))
     title = f"{run.tacton} on {label(run.body)}: {run.model}"
-    groups = {run.tacton: [run]}
-    page_of(title, groups, first, Gallery(), after=more, command=command).write(folder)
+    page_of(
+        title, {run.tacton: [run]}, first, Gallery(), after=more, command=command,
+        failures=failures,
+    ).write(folder)  # fmt: skip
+    return failures
 
 
 def _efforts_by_body(runs: Sequence[Run]) -> dict[str, Effort]:
@@ -424,7 +446,8 @@ def _first_names(names: Sequence[str]) -> str:
 
 def _uncertainty(first: FirstScreen) -> str:
     """Return sentences on the uncertainty of the numbers."""
-    parts = [f"{first.budget.words}."] if first.budget else []
+    words = first.budget.words if first.budget else ""
+    parts = [f"{words[:1].upper()}{words[1:]}."] if words else []
     if first.shares:
         low, high = (100 * share for share in first.shares)
         parts.append(

@@ -8,11 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from simple_model import Response
-from simple_model.load.tacton import repetition_frequencies
-from skinwave.bodies.flattened import flattened
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.live import html_file
 from skinwave.measure.comparison import (
@@ -23,33 +19,30 @@ from skinwave.measure.comparison import (
     runs_to_draw,
 )
 from skinwave.models import named
-from skinwave.models.flat_body import FLAT_BODY
-from skinwave.models.limits import check_takes, takes
+from skinwave.models.limits import check_takes
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
-from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.planning.assessment import assess, coarser_body
 from skinwave.planning.plan import chosen_model, plan
 from skinwave.planning.simulate import compute, solve
 from skinwave.results.claims import AssessedClaim, assessable_runs, evaluate, write_claims
 from skinwave.results.files import write_lines, write_responses, write_run
-from skinwave.results.playback import played_part
 from skinwave.results.run import Run
-from skinwave.results.surface import element_map, grid, map_motions
-from skinwave.results.views import View, body_view, flat_view, kernel_view
 from skinwave.scene import paper15
-from skinwave.scene.scene import Body, Scene, with_body
+from skinwave.scene.scene import Body, Scene
 from skinwave.studies.album import scene_columns
-from skinwave.studies.first_screen import (
-    Maps,
-    beside_kernel,
-    first_name,
-    first_screen,
-    has_quick_map,
-    quick_maps,
-)
+from skinwave.studies.first_screen import Maps, first_name, first_screen, has_quick_map, quick_maps
 from skinwave.studies.pages import Gallery, efforts_of, page_of
+from skinwave.studies.surfaces import (
+    Part,
+    Surfaces,
+    element_surfaces,
+    flat_run,
+    played,
+    quick_surface,
+    views_of,
+)
 from skinwave.system import document
 from skinwave.system.effort import Progress, one_thread, peak_memory, silent
 from skinwave.system.failures import failure_text, or_failed
@@ -97,8 +90,8 @@ def own_scenes(scene: Scene, name: str) -> Scenes:
     columns = scene_columns(scene)
     if not any(each.body.of_kind.discretise for each in columns.values()):
         raise ValueError(
-            "path or probes fit neither on the paper sheet nor on the skin slab. Give the scene a "
-            "body under [body]"
+            "path or probes fit neither on the paper sheet nor on the palm. Give the scene a body "
+            "under [body]"
         )
     return {name: columns}
 
@@ -151,7 +144,7 @@ def run_study(
         write_responses(folder / "responses.npz", by_name)
         first = None
         if not interrupted:
-            views = _views(scenes[first_name(scenes)], found.surfaces)
+            views = views_of(scenes[first_name(scenes)], found.surfaces)
             first = first_screen(groups, found.maps, views, found.checks)
         parts: list[document.Part] = []
         with or_failed(failed, "live page"):
@@ -219,17 +212,6 @@ def _completeness(model: str) -> int:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Surface:
-    """Motion of a surface under one Tacton: maps of the body and of the kernel, and a view."""
-
-    maps: Maps = ()
-    view: View | None = None
-
-
-Surfaces = dict[tuple[str, str], Surface]  # by Tacton and column
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Found:
     """What a study finds beside its runs: reduced bodies by column, surfaces, runs of flat slabs
     beside bodies by column, and reasons of failed parts.
@@ -266,24 +248,25 @@ def _runs(
     prepared, failures = found.prepared, found.failures
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
     reduced = {column for column, model in models.items() if named(model).is_reduced}
-    every.sort(key=lambda each: (named(models[each[1]]).seconds > SLOW, each[1] not in reduced))
+    # Bodies are reduced here while workers compute slow responses.
+    every.sort(key=lambda each: 1 if each[1] in reduced else 2 * _is_slow(models[each[1]]))
     several, sizes = len(scenes) > 1, paper15.SIZES
     size_of = {column: replace(options, h=options.h or sizes.get(column)) for column in reduced}
     coarse = {column: s for _, column, s in every if several and column in reduced}
-    coarser = {c: workers.submit(coarser_body, s, size_of[c]) for c, s in coarse.items()}
+    coarser = {c: workers.submit(coarser_body, s, options, sizes.get(c)) for c, s in coarse.items()}
     pictured = first_name(scenes)
-    part = _played(scenes[pictured])
+    part = played(scenes[pictured])
     meshed = {
         column: {name: group[column] for name, group in scenes.items() if column in group}
         for _, column, s in every
         if s.body.of_kind.discretise and s.reading.is_plain and not has_quick_map(s)
     }
     moved = [
-        workers.submit(_element_surfaces, column, own, replace(options, model="auto"), part)
+        workers.submit(element_surfaces, column, own, replace(options, model="auto"), part)
         for column, own in meshed.items()
     ]
     flat = {
-        column: workers.submit(_flat_run, pictured, scene, options)
+        column: workers.submit(flat_run, pictured, scene, options)
         for column, scene in scenes[pictured].items() if column in reduced and scene.body.is_solid
     }  # fmt: skip
     others = {
@@ -330,69 +313,20 @@ def _runs(
                 found.checks[column] = run
 
 
+def _is_slow(model: str) -> bool:
+    return named(model).seconds > SLOW
+
+
 def _report(progress: Progress, column: str, phase: str, fraction: float) -> None:
     progress(f"{column}: {phase}", fraction)
 
 
-def _played(scenes: Mapping[str, Scene]) -> tuple[float, int]:
-    """Return the part of a Tacton that its pictures play, for all its scenes."""
-    scene = scenes[SAME_LOAD.name]
-    fastest = max(repetition_frequencies(scene.tacton).values(), default=0.0)
-    return played_part(scene.pressure, fastest)
-
-
 def _response(
-    name: str, column: str, scene: Scene, options: SolveOptions, part: tuple[float, int] | None
+    name: str, column: str, scene: Scene, options: SolveOptions, part: Part | None
 ) -> tuple[Response, tuple[Surfaces, dict[str, str]]]:
     """Return a response and, of a body whose surface needs no mesh, its map and view."""
     if not scene.body.of_kind.discretise:
         return compute(scene, options.model), ({}, {})
     response = solve(scene, plan(scene, options))
     run = Run(tacton=name, body=column, scene=scene, response=response)
-    failures: dict[str, str] = {}
-    surface = Surface()
-    with or_failed(failures, f"map of {column}"):
-        surface = Surface(maps=quick_maps(run))
-        if part and surface.maps:
-            reach = np.array([scene.body.width, scene.body.height]) / 2
-            surface = replace(surface, view=flat_view(run, reach, part))
-    return response, ({(name, column): surface}, failures)
-
-
-def _flat_run(name: str, scene: Scene, options: SolveOptions) -> Run | None:
-    """Return the run of an infinite slab with the strata that a body has under the focus, or None
-    if the wavenumber integral does not take it.
-    """
-    places = np.vstack([scene.tacton.trajectory.outline, scene.probe_points])
-    slab = flattened(scene.body, places, default_size(scene.body))
-    flat = with_body(scene, slab)
-    if not takes(FLAT_BODY, flat):
-        return None
-    response = solve(flat, plan(flat, replace(options, model=FLAT_BODY.name)))
-    return Run(tacton=name, body="flat slab", scene=flat, response=response)
-
-
-def _element_surfaces(
-    column: str, scenes: Mapping[str, Scene], options: SolveOptions, part: tuple[float, int]
-) -> tuple[Surfaces, dict[str, str]]:
-    """Return the maps of one meshed body under all Tactons, and one view."""
-    names, failures = {scene: name for name, scene in scenes.items()}, dict[str, str]()
-    surfaces: Surfaces = {}
-    with or_failed(failures, f"map of {column}"):
-        for scene, motion in map_motions(list(scenes.values()), options):
-            view, name = None, names[scene]
-            if name == first_name(scenes):
-                view = replace(body_view(scene, column, motion, part), moved=None)
-            maps = beside_kernel(scene, element_map(scene, motion, *grid(scene)))
-            surfaces[name, column] = Surface(maps=maps, view=view)
-    return surfaces, failures
-
-
-def _views(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:
-    """Return the views of the kernel and of the bodies under one Tacton, if there are any."""
-    views = {view.column: view for each in surfaces.values() if (view := each.view)}
-    own = [views[column] for column in scenes if column in views]
-    if not own:
-        return []
-    reach = np.max([np.abs(view.places).max(axis=0) for view in own], axis=0)
-    return [kernel_view(scenes[SAME_LOAD.name], reach, _played(scenes)), *own]
+    return response, quick_surface(run, part)

@@ -16,6 +16,7 @@ from skinwave import BODIES
 from skinwave.bodies.sizes import check_mesh
 from skinwave.commands.cli import main
 from skinwave.commands.common import progress_of
+from skinwave.scene import paper15
 from skinwave.studies import study
 
 CLAMPED = SMALL.replace("[body]", '[body]\nthickness_mm = 8\nsides = "clamped"')
@@ -74,12 +75,12 @@ def test_compare_a_scene_of_ones_own(scene):
 def test_a_run_that_fails_is_named_first_and_the_others_are_compared(scene, monkeypatch, capsys):
     solve = study._response
 
-    def fails_on_paper(scene, *given):
+    def fails_on_paper(name, column, scene, *given):
         if scene.body.of_kind.is_plate:
             raise ArithmeticError("no solution")
-        return solve(scene, *given)
+        return solve(name, column, scene, *given)
 
-    monkeypatch.setattr(study, "slow_maps", Mock(side_effect=ArithmeticError("no solution")))
+    monkeypatch.setattr(paper15, "MEASURED_ON", ("paper-sheet", "skin-slab"))  # a palm is slow
     monkeypatch.setattr(study, "_response", fails_on_paper)
     monkeypatch.setattr("skinwave.live.html_file.pack_of", Mock(side_effect=ValueError("no pack")))
     scene.write_text(SMALL.partition("[body]")[0] + '[body]\nkind = "none"\n')
@@ -142,7 +143,7 @@ def test_progress_shows_the_step_and_the_time(capsys, monkeypatch, terminal):
 def test_an_interrupt_keeps_finished_runs(scene, monkeypatch, capsys):
     scene.write_text(CLAMPED)
     interrupted = Mock(side_effect=KeyboardInterrupt)
-    monkeypatch.setattr("skinwave.studies.study.prepare", interrupted)
+    monkeypatch.setattr("skinwave.studies.study.plan", interrupted)
     assert main(["compare", str(scene), "--element-size", "8", "--out", "cut", "--quiet"]) == 1
     page = (scene.parent / "cut/index.html").read_text()
     assert "Interrupted" in page

@@ -95,7 +95,7 @@ def test_a_scene_is_shown_on_its_own_body_under_its_load(scene):
     assert list(shown) == ["point-kernel-published", "point-kernel", "slab"]
     assert shown["point-kernel"].pressure == shown["slab"].pressure == own
     bare = album.scene_columns(replace(scene, pressure=own, body=Body(kind="none")))
-    assert list(bare)[2:] == ["paper-sheet", "skin-slab"]
+    assert list(bare)[2:] == ["paper-sheet", "palm"]
     assert {its.pressure for its in list(bare.values())[1:]} == {own}
     asked = album.scene_columns(scene, ["paper-sheet-loose", "skin-slab"])
     assert list(asked)[2:] == ["skin-slab", "paper-sheet-loose"]

@@ -1,0 +1,100 @@
+"""Surfaces of a page: maps of bodies and of the kernel, and views of all at the same times."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from simple_model.load.tacton import repetition_frequencies
+from skinwave.bodies.flattened import flattened
+from skinwave.bodies.sizes import default_size
+from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.limits import takes
+from skinwave.models.options import SolveOptions
+from skinwave.models.point_kernel import SAME_LOAD
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import solve
+from skinwave.results.playback import played_part
+from skinwave.results.run import Run
+from skinwave.results.surface import element_map, grid, map_motions
+from skinwave.results.views import View, body_view, flat_view, kernel_view
+from skinwave.scene.scene import Scene, with_body
+from skinwave.studies.first_screen import Maps, beside_kernel, first_name, quick_maps
+from skinwave.system.failures import or_failed
+
+Part = tuple[float, int]  # the duration in s and the number of frames that a view shows
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Motion of a surface under one Tacton: maps of the body and of the kernel, and a view."""
+
+    maps: Maps = ()
+    view: View | None = None
+
+
+Surfaces = dict[tuple[str, str], Surface]  # by Tacton and column
+
+
+def played(scenes: Mapping[str, Scene]) -> Part:
+    """Return the part of a Tacton that its views show, the same for all its scenes by column."""
+    scene = scenes[SAME_LOAD.name]
+    fastest = max(repetition_frequencies(scene.tacton).values(), default=0.0)
+    return played_part(scene.pressure, fastest)
+
+
+def quick_surface(run: Run, part: Part | None) -> tuple[Surfaces, dict[str, str]]:
+    """Return the map of a body whose surface needs no mesh, with a view if it has a `part`, and
+    the reasons of failed parts.
+    """
+    failures: dict[str, str] = {}
+    surface, body = Surface(), run.scene.body
+    with or_failed(failures, f"map of {run.column}"):
+        surface = Surface(maps=quick_maps(run))
+        if part and surface.maps:
+            reach = np.array([body.width, body.height]) / 2
+            surface = replace(surface, view=flat_view(run, reach, part))
+    return {(run.tacton, run.column): surface}, failures
+
+
+def element_surfaces(
+    column: str, scenes: Mapping[str, Scene], options: SolveOptions, part: Part
+) -> tuple[Surfaces, dict[str, str]]:
+    """Return the maps of one meshed body under all Tactons, with a view of the first, and the
+    reasons of failed parts.
+    """
+    names, failures = {scene: name for name, scene in scenes.items()}, dict[str, str]()
+    surfaces: Surfaces = {}
+    with or_failed(failures, f"map of {column}"):
+        for scene, motion in map_motions(list(scenes.values()), options):
+            view, name = None, names[scene]
+            if name == first_name(scenes):
+                view = replace(body_view(scene, column, motion, part), moved=None)
+            maps = beside_kernel(scene, element_map(scene, motion, *grid(scene)))
+            surfaces[name, column] = Surface(maps=maps, view=view)
+    return surfaces, failures
+
+
+def views_of(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:
+    """Return the views of the kernel and of bodies under one Tacton, if there are any; `scenes`
+    are those of the Tacton by column.
+    """
+    views = {view.column: view for each in surfaces.values() if (view := each.view)}
+    own = [views[column] for column in scenes if column in views]
+    if not own:
+        return []
+    reach = np.max([np.abs(view.places).max(axis=0) for view in own], axis=0)
+    return [kernel_view(scenes[SAME_LOAD.name], reach, played(scenes)), *own]
+
+
+def flat_run(name: str, scene: Scene, options: SolveOptions) -> Run | None:
+    """Return the run of an infinite slab with the strata that a body has under the focus, or None
+    if the wavenumber integral does not take it.
+    """
+    places = np.vstack([scene.tacton.trajectory.outline, scene.probe_points])
+    slab = flattened(scene.body, places, default_size(scene.body))
+    flat = with_body(scene, slab)
+    if not takes(FLAT_BODY, flat):
+        return None
+    response = solve(flat, plan(flat, replace(options, model=FLAT_BODY.name)))
+    return Run(tacton=name, body="flat slab", scene=flat, response=response)
