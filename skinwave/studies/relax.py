@@ -10,7 +10,6 @@ import os
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,7 +17,6 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from matplotlib.figure import Figure
 
-from fem import NotReduced
 from simple_model import Effort, MovingPressure, Response, lines, resolved_lines, sensation_level
 from simple_model.line_table import lines_in_pulses
 from simple_model.load.drive import usual_drive
@@ -58,9 +56,6 @@ HIGHEST = 600.0  # Hz, of the lines that are compared
 WEAKEST_RATIO = 0.01  # to the strongest line at a probe
 TINY = np.finfo(float).tiny
 FIRST = "as published"  # step of the model point-kernel-published
-# With a tenth of the damping a reduction may need more moments than allowed. Larger elements need
-# as many, which shows this at a tenth of the cost.
-ALMOST_UNDAMPED, COARSER = "all but: little loss", 3.0
 LINE_COLUMNS = (
     "step", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_step_before_db",
     "from_richest_db",
@@ -229,10 +224,9 @@ def hierarchy_of(
                 continue
             is_reduced = named(step.model).is_reduced
             size = h or min(element_size(scene), element_size(changed)) if is_reduced else h
-            coarse_first = is_reduced and step.name == ALMOST_UNDAMPED
             workers = large if is_reduced else small
             whole = replace(changed, probes=probes)
-            submitted.append(workers.submit(_time, whole, step.model, size, cache, coarse_first))
+            submitted.append(workers.submit(_time, whole, step.model, size, cache))
         for k, future in enumerate(submitted):
             progress(steps[k].name, k / len(steps))
             if future:
@@ -274,20 +268,9 @@ def _outward(scene: Scene, body: Body, h: float) -> Outward | None:
         return None
 
 
-def _time(
-    scene: Scene, model: str, h: float | None, cache: str, coarse_first: bool
-) -> tuple[Response, float, int]:
-    """Return a response, its seconds and the peak memory of its process.
-
-    With `coarse_first`, coarse elements are reduced first, to refuse a body at little cost.
-    """
+def _time(scene: Scene, model: str, h: float | None, cache: str) -> tuple[Response, float, int]:
+    """Return a response, its seconds and the peak memory of its process."""
     os.environ["SKINWAVE_CACHE"] = cache
-    if coarse_first and h:
-        with suppress(ValueError):
-            try:
-                compute(scene, model, h=COARSER * h)
-            except NotReduced as error:
-                raise ArithmeticError(str(error)) from None
     started = time.perf_counter()
     response = compute(scene, model, h=h)
     seconds, memory = time.perf_counter() - started, peak_memory()

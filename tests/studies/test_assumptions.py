@@ -288,29 +288,6 @@ def test_a_shared_body_is_reduced_once(monkeypatch):
         assert (step.response.values == found[0].response.values).all()
 
 
-@pytest.mark.usefixtures("in_one_process")
-def test_a_body_that_cannot_be_reduced_is_refused_on_a_coarse_mesh(monkeypatch):
-    asked = []
-
-    def not_reduced(scene, model, h=None):
-        asked.append(h)
-        if "fem" in model:
-            raise fem.NotReduced("200 moments leave an error")
-        return compute(scene, model)
-
-    def step(scene, dropped):
-        return scene, "fem" if set(dropped) == {"linear drive", "vacuum"} else "point-kernel"
-
-    monkeypatch.setattr(relax, "compute", not_reduced)
-    pretend(monkeypatch, ("linear drive", "little loss", "vacuum"), step)
-    found = hierarchy_of(SKIN, lambda phase, done: None, h=5e-3)
-    (failed,) = [step for step in found.every if step.error]
-    assert failed.name == "all but: little loss"
-    assert "200 moments" in failed.error
-    assert asked.count(pytest.approx(15e-3)) == 1  # and never on the fine one
-    assert len([h for h in asked if h == 5e-3]) == len(found.every) - 1
-
-
 def test_changes_of_lines_in_decibel():
     times = np.arange(1000) / 10_000
     loud = np.sin(2 * np.pi * 140 * times)[:, None]
