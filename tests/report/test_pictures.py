@@ -33,7 +33,7 @@ from skinwave.report.styles import style
 from skinwave.results import exports, motion, playback, views
 from skinwave.results.surface import SurfaceField
 from skinwave.scene.file import dumps
-from skinwave.scene.scene import BODIES, Body, Layer, Mounting, Scene, Sides
+from skinwave.scene.scene import BODIES, Body, Layer, Mounting, Placement, Scene, Sides
 from skinwave.studies import album, pages, report
 
 ONLY = "point-kernel-published,point-kernel,skin-slab"
@@ -253,6 +253,12 @@ def test_a_body_is_drawn_with_its_conditions_and_materials(body, named, material
     shown = {drawn.names[k] for k in np.unique(drawn.region).tolist()}
     assert shown == materials
     assert drawn.is_cut == (len(materials) > 1)
+
+
+def test_a_body_beside_the_origin_is_cut_open_at_its_middle():
+    assert not body_picture.meshed_body(LAYERED).corner.any()
+    beside = replace(LAYERED, placement=Placement(offset=(0.02, -0.03)))
+    np.testing.assert_allclose(body_picture.meshed_body(beside).corner, [20, -30], atol=1e-9)
 
 
 @draws
