@@ -11,6 +11,7 @@ import contextlib
 import io
 import os
 import warnings
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ BY_VTK = (
     ".ply", ".obj", ".glb", ".gltf",
 )  # fmt: skip
 FORMATS = (*BY_VTK, *BY_MESHIO, ".inp")
+SEVERAL_FILES = (".pvtu", ".vtm", ".xdmf", ".xmf", ".gltf")  # which name other files
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # gmsh cannot read the version 4.1 of meshio
 
@@ -41,12 +43,20 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
         raise MeshError(f"{path} has an unknown file format; give one of {', '.join(FORMATS)}")
     if not path.is_file():
         raise MeshError(f"{path} does not exist; check its name")
+    written = path.stat()
+    read = _read.__wrapped__ if path.suffix.lower() in SEVERAL_FILES else _read
     try:
-        return subprocess_call.call_reader(read_file, path)
+        return read(path, written.st_mtime_ns, written.st_size)
     except subprocess_call.Crashed:
         raise MeshError(f"{path} is damaged or cut short; save it again") from None
     except MeshError as error:
         raise MeshError(str(error).replace(str(path.resolve()), str(path))) from None
+
+
+@lru_cache(maxsize=2)  # a plan, a response, a map and a picture of a body mesh the same file
+def _read(path: Path, modified: int, size: int) -> Contents:
+    """Return the parts of a file that was modified at a time in ns and has a size in bytes."""
+    return subprocess_call.call_reader(read_file, path)
 
 
 def scale_of(unit: str) -> float:

@@ -121,7 +121,8 @@ def random_scene(
     least `lowest` in m, and the probe is at one of the places, () for any.
     """
     bounded = body.of_kind.is_bounded
-    half = min(0.025, *((body.width / 2, body.height / 2) if bounded else ()))
+    sides = (body.width / 2, body.height / 2) if bounded else (float(np.abs(places).max()),)
+    half = min(0.025, *sides)
     shape = str(rng.choice(SHAPES))
     size, path = round(float(rng.uniform(0.2, 1.0)) * half, 4), Trajectory(shape=shape)
     if shape != "point":
