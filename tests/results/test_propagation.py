@@ -9,18 +9,28 @@ import pytest
 
 from simple_model import MovingPressure, Response, Rhythm, Tacton, Trajectory, phasors
 from simple_model.load.spectrum import load_lines, synthesise
+from simple_model.numbers import significant
 from skinwave.models.options import SolveOptions
 from skinwave.planning.simulate import compute, simulate
+from skinwave.report.figures import REPORT
 from skinwave.report.maps import rms_text
 from skinwave.results import surface
 from skinwave.results.claims import evaluate
 from skinwave.results.comparison import compare, steady_lines, steady_rms
-from skinwave.results.propagation import mach_angle, propagation, share_outside
+from skinwave.results.propagation import (
+    area_of,
+    distance_along,
+    half_within,
+    mach_angle,
+    propagation,
+    share_outside,
+)
 from skinwave.results.run import Run
 from skinwave.results.surface import SurfaceField, body_map, grid, kernel_map
 from skinwave.scene.file import read
 from skinwave.scene.paper15 import beside_kernels, tactons
 from skinwave.scene.scene import BODIES, Body, Scene, with_body
+from skinwave.studies import overview
 from skinwave.studies.first_screen import first_screen, quick_maps, with_kernels
 from skinwave.studies.pages import four_numbers, sentences
 from skinwave.sweeps.ensemble import method_of, solve_sample
@@ -321,3 +331,45 @@ def test_a_rhythm_alone_has_the_level_of_its_lines():
     scene = Scene(pressure=MovingPressure(tacton=tacton), body=Body(), probes=((0.0, 0.0),))
     run = Run(tacton="", body="slab", scene=scene, response=compute(scene, "flat-body"))
     assert set(run.levels) == set(run.table.frequencies) > {"f_r"}
+
+
+def test_half_of_a_gaussian_and_lengths_on_a_cylinder():
+    x = 2.5e-4 * np.arange(-60, 61)
+    still = MovingPressure(tacton=Tacton(am_frequency=100))
+    scene = Scene(pressure=still, body=Body())
+    flat = SurfaceField(x=x, y=x, rms=np.exp(-np.add.outer(x**2, x**2) / (2 * 4e-3**2)))
+    distance = distance_along(scene, flat)
+    half = half_within(flat.rms, area_of(flat), distance)
+    assert half == pytest.approx(4e-3 * np.sqrt(np.log(2)), rel=0.01)
+    radius = 2e-2
+    curved = replace(flat, height=np.tile(np.sqrt(radius**2 - x**2), (len(x), 1)))
+    along = distance_along(scene, curved)
+    np.testing.assert_allclose(along[60], radius * np.arcsin(np.abs(x) / radius), atol=3e-5)
+    np.testing.assert_allclose(along[:, 60], np.abs(x), atol=1e-9)
+    area = area_of(curved)
+    np.testing.assert_allclose(area[60, 1:-1], 1 / np.cos(np.arcsin(x[1:-1] / radius)), rtol=0.01)
+    # Places count by their area: the half of a cylinder reaches further along its curve.
+    assert half_within(np.ones_like(flat.rms), area, along) > half_within(
+        np.ones_like(flat.rms), area_of(flat), distance
+    )
+
+
+def test_the_verdict_over_tactons_counts_lines_and_states_medians():
+    tactons_ = [Tacton(am_frequency=f, duration=0.3) for f in (80, 140, 200)]
+    groups = {}
+    for k, tacton in enumerate(tactons_):
+        scene = Scene(pressure=MovingPressure(tacton=tacton), body=Body())
+        groups[str(k)] = with_kernels(_run(scene, "flat-body-harmonic", name=str(k)))
+    first = first_screen(groups, quick_maps)
+    values = 1e3 * np.array([each["skin-slab"].half for each in first.effects.values()])
+    rows = {row[0]: row[1:] for row in overview.table(first.effects).rows}
+    assert rows[overview.HALF][1].startswith(significant(float(np.median(values)), 2))
+    assert rows["motion outside the kernel's -20 dB region"][0] == "0 %"
+    (motion,) = overview.sentences(first.effects, groups)  # all have the kernel's strongest line
+    assert "same 3 loads" in motion
+    strongest = replace(first.effects["1"]["skin-slab"].strongest, name="2f_AM")
+    other = replace(first.effects["1"]["skin-slab"], strongest=strongest)
+    changed = dict(first.effects) | {"1": {"skin-slab": other}}
+    assert "in 1 of 3 Tactons" in overview.sentences(changed, groups)[1]
+    drawn = overview.figure(first.effects, REPORT)
+    assert len(drawn.axes) == len(rows)
