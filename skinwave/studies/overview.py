@@ -127,7 +127,8 @@ def figure(effects: Effects, style: Style) -> Figure:
                 ax.plot(np.median(values), row, marker="|", ms=18, mew=2, color=ink_colour(column))
         words = number.name.replace(", from the path", "").replace(" at the probes", "")
         half = words.find(" ", len(words) // 2)
-        ax.set_xlabel(f"{words[:half]}\n{words[half + 1 :]}, {number.unit}")
+        text = f"{words[:half]}\n{words[half + 1 :]}, {number.unit}"
+        ax.set_xlabel(text.replace(" -", " \N{MINUS SIGN}").replace("\n-", "\n\N{MINUS SIGN}"))
         ax.grid(axis="x", alpha=0.3)
     axes[0].set(yticks=range(len(columns)), yticklabels=map(label, columns))
     axes[0].set_ylim(len(columns) - 0.4, -0.6)  # the kernel first

@@ -212,7 +212,7 @@ def hierarchy_of(
         scenes.append(changed)
     steps = _with_shared_models(steps, scenes, len(up))
     line = _outward(scene, scenes[len(up) - 1].body, element_size(scene, h))
-    probes = (*scene.probes, *map(tuple, line.probes.tolist())) if line else scene.probes
+    more = tuple(map(tuple, line.probes.tolist())) if line else ()
     submitted: list[Future[tuple[Response, float, int]] | None] = []
     with (
         TemporaryDirectory(prefix="skinwave-") as cache,
@@ -225,8 +225,7 @@ def hierarchy_of(
             is_reduced = named(step.model).is_reduced
             size = h or min(element_size(scene), element_size(changed)) if is_reduced else h
             workers = large if is_reduced else small
-            whole = replace(changed, probes=probes)
-            submitted.append(workers.submit(_time, whole, step.model, size, cache))
+            submitted.append(workers.submit(_time, changed, more, step.model, size, cache))
         for k, future in enumerate(submitted):
             progress(steps[k].name, k / len(steps))
             if future:
@@ -268,15 +267,25 @@ def _outward(scene: Scene, body: Body, h: float) -> Outward | None:
         return None
 
 
-def _time(scene: Scene, model: str, h: float | None, cache: str) -> tuple[Response, float, int]:
-    """Return a response, its seconds and the peak memory of its process."""
+def _time(
+    scene: Scene, more: tuple[tuple[float, float], ...], model: str, h: float | None, cache: str
+) -> tuple[Response, float, int]:
+    """Return a response at the probes of a scene and at `more`, its seconds and the peak memory of
+    its process.
+    """
     os.environ["SKINWAVE_CACHE"] = cache
     started = time.perf_counter()
-    response = compute(scene, model, h=h)
+    response = compute(replace(scene, probes=(*scene.probes, *more)), model, h=h)
     seconds, memory = time.perf_counter() - started, peak_memory()
     # All steps have the same discretisation error, which does not affect their differences.
-    effort = replace(response.effort, warnings=all_warnings(scene, response, h=h))
+    own = _at_first(response, len(scene.probes))
+    effort = replace(response.effort, warnings=all_warnings(scene, own, h=h))
     return replace(response, effort=effort), seconds, memory
+
+
+def _at_first(response: Response, count: int) -> Response:
+    """Return a response at its first probes."""
+    return replace(response, probes=response.probes[:count], values=response.values[:, :count])
 
 
 def _compute(
@@ -295,7 +304,7 @@ def _compute(
     except REASONS as error:
         return replace(step, error=reason(error))
     count = len(scene.probes)
-    response = replace(whole, probes=whole.probes[:count], values=whole.values[:, :count])
+    response = _at_first(whole, count)
     if scene.body.is_skin:
         levels = levels_at_probes(scene, whole)
         step = replace(
