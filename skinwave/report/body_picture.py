@@ -147,7 +147,8 @@ def _conditions(body: Body, build: Build, facets: Ints) -> tuple[Array, Floats]:
         springs, dashpots = (
             each.reshape(len(support.facets), -1).mean(axis=1) for each in (held, support.absorbed)
         )
-        for name, share in ((SPRINGS, springs), (ABSORBING, dashpots)):
+        held_by = SPRINGS if body.base == "elastic" else CLAMPED  # by soft tissue over bone
+        for name, share in ((held_by, springs), (ABSORBING, dashpots)):
             acts = (share > 0) & (share == np.maximum(springs, dashpots))
             mark(name, support.facets[acts], share[acts])
     for name, components in build.fixed.items():

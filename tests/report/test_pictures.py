@@ -229,7 +229,7 @@ LAYERED = Body(
     [
         (LAYERED, {"free", "clamped", "absorbing"}, {"fat", "muscle"}),
         (BODIES["fingertip"], {"free", "clamped"}, {"palm", "bone"}),
-        (Body(kind="palm"), {"free", "on springs", "absorbing"}, {"palm"}),
+        (Body(kind="palm"), {"free", "clamped", "absorbing"}, {"palm"}),
         (
             replace(BODIES["paper-sheet"], mounting=Mounting(edges=("left",), support="clamped")),
             {"free", "clamped"}, {"paper-grain"},
