@@ -86,6 +86,9 @@ class Here:
 
     map = staticmethod(map)
 
+    def shutdown(self, **options):
+        """Nothing is left to do."""
+
     def submit(self, function, *given, **options):
         done = Future()
         try:

@@ -319,9 +319,8 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
     """Solve the linear motion from rest, and add the effect of stretching."""
     started = time.perf_counter()
     modes: PlateModes = modes_of(plate_of(scene.body))
-    found = _stretch(
-        scene, len(times), step(times), options.tolerance, options.dt, options.progress
-    )
+    options.progress("large deflection", 0.0)
+    found = _stretch(scene, len(times), step(times), options.tolerance, options.dt)
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
         reduced_dofs=found.count, steps=found.parts * (len(times) - 1),
@@ -354,7 +353,7 @@ def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Callab
     """
     times, middle = sample_times(scene), scene.body.placement.offset
     modes: PlateModes = modes_of(plate_of(scene.body))
-    found = _stretch(scene, len(times), step(times), tolerance)
+    found = _stretch(scene, len(times), step(times), tolerance, None)
     plate, stretching = _coordinates(
         scene.pressure, scene.body, len(times), step(times), found.count, found.parts
     )
@@ -380,8 +379,7 @@ class Stretching:
 
 @lru_cache(maxsize=1)  # a response and a map of the same motion
 def _stretch(
-    scene: Scene, samples: int, sample: float, tolerance: float, dt: float | None = None,
-    progress: Progress = silent,
+    scene: Scene, samples: int, sample: float, tolerance: float, dt: float | None
 ) -> Stretching:  # fmt: skip
     """Return what stretching adds at every `sample` in s, within the tolerance if possible.
 
@@ -389,13 +387,11 @@ def _stretch(
     a resonance may build up slowly, and errors grow with it.
     """
     times: Floats = sample * np.arange(samples, dtype=np.float64)
-    options = SolveOptions(tolerance=tolerance, dt=dt, progress=progress)
+    options = SolveOptions(tolerance=tolerance, dt=dt)
     linear = FROM_REST.solve(scene, times, options).values
     start = first_part(scene, times)
-    options.progress("large deflection", 0.0)
     found = _resolve(scene, start, options, linear[: len(start)])
     if len(start) < len(times):
-        options.progress("large deflection", 0.2)
         found = _resolve(scene, times, options, linear, (found.count, found.parts))
     return found
 
@@ -477,7 +473,7 @@ def _stretching(scene: Scene, times: Floats, count: int, parts: int) -> Floats:
     return np.asarray(values[::parts])
 
 
-@lru_cache(maxsize=12)  # the response, the map and the picture of a sheet need the same ones
+@lru_cache(maxsize=3)  # the response, the map and the picture of a sheet need the same ones
 def _coordinates(
     pressure: MovingPressure, body: Body, samples: int, sample: float, count: int, parts: int
 ) -> tuple[KarmanPlate, Floats]:

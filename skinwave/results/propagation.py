@@ -104,7 +104,7 @@ def propagation(
         highest_sensation=strongest_component(run, by_sensation=True) if run.is_skin else None,
         delay=_delay(run, kernel, of_kernel.frequency) if strongest and of_kernel else None,
     )
-    if surface is None or kernel_surface is None or not surface.rms.any():
+    if surface is None or kernel_surface is None or not np.nan_to_num(surface.rms).any():
         return effect
     distance, area = distance_along(run.scene, surface), area_of(surface)
     rms, kernel_rms = surface.rms, kernel_surface.rms

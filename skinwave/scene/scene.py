@@ -231,7 +231,7 @@ def default_probes(body: Body) -> tuple[tuple[float, float], ...]:
     too narrow for them. The width of a body from a file is not known; it gets `PROBES`.
     """
     half, furthest = body.width / 2, PROBES[-1][0]
-    if not body.of_kind.is_bounded or half >= furthest:
+    if not body.of_kind.is_bounded or half > furthest:
         return PROBES
     step = float(f"{OUTERMOST * half / (len(PROBES) - 1):.2g}")
     return tuple((round(k * step, 9), 0.0) for k in range(len(PROBES)))

@@ -70,5 +70,6 @@ def _on_body(body: Body, places: Floats, h: float) -> np.ndarray:
     """Mask (k,) of the places (k, 2) in m on the surface of a body."""
     if body.of_kind.is_plate or body.of_kind.is_layer:
         half = np.array([body.width, body.height]) / 2
-        return np.asarray((np.abs(places) < half).all(axis=1))
+        about = np.maximum(np.abs(places), np.abs(places - body.placement.offset))
+        return np.asarray((about < half).all(axis=1))
     return on_surface(meshed(body, h).mesh, places)

@@ -22,8 +22,9 @@ OF_PRESSURE = "none (a pressure)"
 ABOUT = (
     "Medians over the Tactons, with the smallest and the largest value in brackets. In the picture "
     "each dot is a Tacton, and a bar the median. Half of the motion: of the integral of squared "
-    "RMS. The delay is that of the kernel's strongest line in motion relative to pressure, at the "
-    "probe nearest to the path, known up to whole periods; below 0 the body is ahead."
+    "RMS. A reach ends at the edge of the map or of the body. The delay is that of the kernel's "
+    "strongest line in motion relative to pressure, at the probe nearest to the path, known up to "
+    "whole periods; below 0 the body is ahead."
 )
 HALF = "half of the motion within, from the path"
 
@@ -60,7 +61,8 @@ NUMBERS = (
     ),
     Number(
         name=f"motion outside the kernel's {OUTSIDE:g} dB region", unit="%",
-        of=lambda e: _scaled(e.share, 100), of_kernel=lambda e: 0.0, reason="no map",
+        of=lambda e: _scaled(e.share, 100), of_kernel=lambda e: _scaled(e.share, 0.0),
+        reason="no map",
     ),
     Number(
         name="highest sensation level at the probes", unit="dB",
@@ -82,7 +84,8 @@ def columns_of(effects: Effects) -> list[str]:
 def _values(effects: Effects, number: Number, column: str) -> Floats:
     """Return a number of all Tactons that have it: on a body, or of the kernel."""
     if column == SAME_LOAD.name:
-        found = (number.of_kernel(next(iter(each.values()))) for each in effects.values())
+        each = ([number.of_kernel(e) for e in of_tacton.values()] for of_tacton in effects.values())
+        found = (next((v for v in values if v is not None), None) for values in each)
     else:
         found = (number.of(each[column]) for each in effects.values() if column in each)
     return np.array([value for value in found if value is not None])
@@ -172,6 +175,8 @@ def _gains(effects: Effects, groups: Mapping[str, Sequence[Run]], column: str) -
         runs = {run.column: run for run in groups[tacton]}
         effect = each.get(column)
         if effect is None or effect.strongest is None or effect.kernel_strongest is None:
+            continue
+        if SAME_LOAD.name not in runs:
             continue
         names = effect.strongest.name, effect.kernel_strongest.name
         if names[0] != names[1]:

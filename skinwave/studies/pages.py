@@ -5,12 +5,14 @@ contents and one picture. A reader chooses one Tacton's waveforms at a time, and
 """
 
 import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import starmap
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -50,7 +52,6 @@ from skinwave.studies.first_screen import (
     first_name,
     first_screen,
     has_quick_map,
-    quick_maps,
     with_kernels,
 )
 from skinwave.studies.surfaces import Surface, element_surfaces, played, quick_surface, views_of
@@ -73,6 +74,7 @@ COMPARED = (
     "Colour: motion into the body (mean removed) or pressure of the kernel, relative to the "
     "largest value of each model. All models receive the same load."
 )
+T = TypeVar("T")
 PICTURES = "pictures"  # folder of a page's figures
 QUALITY = 88  # of pictures inside a page
 NAMED = 3  # lines that a sentence names
@@ -168,7 +170,7 @@ def page_of(
     shown = _body_parts(runs, gallery, failures) if is_single else []
     body = [*before, *shown, *_waveforms(drawn, len(groups), progress), *after]
     body += tables.claims_parts(evaluate(assessable_runs(runs)))
-    effects = first.effects if first else effects_of(groups, quick_maps)
+    effects = first.effects if first else effects_of(groups, lambda run: ())
     if effects:
         body.append(Details("What propagation changes", _effects_table(effects)))
     if is_single or not effects:
@@ -277,7 +279,16 @@ def _drawn(groups: Mapping[str, Sequence[Run]], gallery: Gallery) -> Iterator[di
     names = sorted(groups, key=lambda each: each != first_name(groups))
     draw = gallery.workers.map if gallery.workers else map
     one = partial(_tacton_pictures, replace(gallery, workers=None), len(groups) == 1)
-    return iter(draw(one, names, map(files.get, names), map(groups.get, names)))
+    of_each = [(name, files[name], groups[name]) for name in names]
+    return _or_here(draw(one, *zip(*of_each, strict=True)), partial(starmap, one, of_each))
+
+
+def _or_here(drawn: Iterable[T], here: Callable[[], Iterable[T]]) -> Iterator[T]:
+    """Yield what processes have drawn, or draw it here if one of them has ended."""
+    try:
+        yield from drawn
+    except BrokenProcessPool:
+        yield from here()
 
 
 def _tacton_pictures(
@@ -375,10 +386,9 @@ def four_numbers(first: FirstScreen) -> Table:
     effects = list(first.own.values())
     # Heading, value of the kernel, values of the bodies.
     rows: list[tuple[str, str | None, Iterable[str | None]]]
-    unknown = f"none ({overview.NOT_SKIN})"
     if any(run.is_skin for run in first.bodies):
-        levels = (_sensation_text(each.highest_sensation) or unknown for each in effects)
-        reaches = (_threshold_text(each) or unknown for each in effects)
+        levels = (_sensation_text(e.highest_sensation) or _why_none(e) for e in effects)
+        reaches = (_threshold_text(e) or _why_none(e) for e in effects)
         rows = [
             ("highest sensation level at the probes", overview.OF_PRESSURE, levels),
             ("reach above threshold, from the path", overview.OF_PRESSURE, reaches),
@@ -400,6 +410,11 @@ def four_numbers(first: FirstScreen) -> Table:
         return Table([name, *bodies], [[heading, *values] for heading, _, values in rows])
     table = [[heading, kernel, *values] for heading, kernel, values in rows]
     return Table([name, "point kernel", *bodies], table)
+
+
+def _why_none(effect: Propagation) -> str:
+    """Return why a body has no sensation level."""
+    return f"none ({overview.NOT_SKIN if effect.strongest else 'nothing vibrates'})"
 
 
 def _deflection_text(run: Run) -> str:

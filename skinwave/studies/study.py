@@ -129,6 +129,8 @@ def run_study(
                 write_run(folder / run.tacton / run.column, run)
                 groups.setdefault(run.tacton, []).append(run)
             interrupted = False
+        if interrupted:
+            workers.shutdown(wait=False, cancel_futures=True)
         for name, group in groups.items():  # in the order of the columns
             group.sort(key=lambda run: [*scenes[name]].index(run.column))
         runs = [run for group in groups.values() for run in group]
@@ -148,7 +150,7 @@ def run_study(
             first = first_screen(groups, found.maps, views, found.checks)
         parts: list[document.Part] = []
         with or_failed(failed, "live page"):
-            html, why = live_page.result()
+            html, why = ("", {}) if interrupted else live_page.result()
             failed |= why
             if html:
                 (folder / LIVE).write_text(html, encoding="utf-8")
@@ -172,8 +174,9 @@ def run_study(
             parts.insert(
                 0, f"Interrupted: this page shows the {len(runs)} finished of {planned} runs."
             )
+        gallery = Gallery(workers=None if interrupted else workers)
         page_of(
-            title, groups, first, Gallery(workers=workers), figures=figures, progress=progress,
+            title, groups, first, gallery, figures=figures, progress=progress,
             before=parts, modelled=[ABOUT], seconds=time.perf_counter() - started,
             command=command, failures=failed,
             notes=["For one run: skinwave run TACTON/BODY/scene.toml in this folder."],
@@ -250,7 +253,8 @@ def _runs(
     reduced = {column for column, model in models.items() if named(model).is_reduced}
     # Bodies are reduced here while workers compute slow responses.
     every.sort(key=lambda each: 1 if each[1] in reduced else 2 * _is_slow(models[each[1]]))
-    several, sizes = len(scenes) > 1, paper15.SIZES
+    several = len(scenes) > 1
+    sizes = paper15.SIZES if several else {}
     size_of = {column: replace(options, h=options.h or sizes.get(column)) for column in reduced}
     coarse = {column: s for _, column, s in every if several and column in reduced}
     coarser = {c: workers.submit(coarser_body, s, options, sizes.get(c)) for c, s in coarse.items()}
