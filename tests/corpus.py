@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -235,3 +236,11 @@ def broken_meshes() -> dict[str, Callable[[], object]]:
 def contents(folder: Path) -> dict[Path, bytes | None]:
     """Every file below a folder, with what is in it; folders with None."""
     return {p: p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
+
+
+def write_block(path: Path, *, regions: bool = True) -> None:
+    """Write a block of 24 x 24 x 8 mm; with regions, its lower half is the region `deep`."""
+    mesh = meshes.block((0.024, 0.024, 0.008), 0.004)
+    deep = mesh.points[mesh.tets[:, :4], 2].mean(axis=1) < mesh.points[:, 2].max() - 4e-3
+    named = {"region": deep.astype(int), "region_names": {0: "skin", 1: "deep"}} if regions else {}
+    meshes.write(path, replace(mesh, facets={}, **named))

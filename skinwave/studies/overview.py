@@ -61,7 +61,7 @@ NUMBERS = (
     ),
     Number(
         name=f"motion outside the kernel's {OUTSIDE:g} dB region", unit="%",
-        of=lambda e: _scaled(e.share, 100), of_kernel=lambda e: _scaled(e.share, 0.0),
+        of=lambda e: _scaled(e.share, 100), of_kernel=lambda e: None if e.share is None else 0.0,
         reason="no map",
     ),
     Number(

@@ -87,9 +87,9 @@ ABOUT_MAPS = (
     "the phase lag of the body; below 0 the body is ahead."
 )
 BODY_CAPTION = (
-    "at rest, as it is meshed, with its boundary conditions. A colour that fades in shows a "
-    "support that begins smoothly, and a plate below the body the condition of its base. A body of "
-    "several materials is cut open."
+    "at rest, with its mesh and its boundary conditions. Where a support begins smoothly, its "
+    "colour fades in. The plate below shows the condition of the base. A body of several materials "
+    "is cut open."
 )
 WAVEFORMS = "Waveforms and spectra; each row is a probe."
 LOADS = (
@@ -512,7 +512,7 @@ def _millisecond(effect: Propagation) -> str | None:
 
 
 def _line_text(component: Component | None) -> str:
-    """Return the kernel's strongest line, of which delays are."""
+    """Return the name and the frequency of the line whose delay is given."""
     return f"{component.name} ({component.frequency:.0f} Hz)" if component else "the strongest line"
 
 

@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from simple_model.load.tacton import repetition_frequencies
-from skinwave.bodies.flattened import flattened
-from skinwave.bodies.sizes import default_size
 from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions
@@ -19,6 +17,7 @@ from skinwave.results.run import Run
 from skinwave.results.surface import element_map, grid, map_motions
 from skinwave.results.views import View, body_view, flat_view, kernel_view
 from skinwave.scene.scene import Scene, with_body
+from skinwave.studies.assumptions import infinite
 from skinwave.studies.first_screen import Maps, beside_kernel, first_name, quick_maps
 from skinwave.system.failures import or_failed
 
@@ -91,9 +90,7 @@ def flat_run(name: str, scene: Scene, options: SolveOptions) -> Run | None:
     """Return the run of an infinite slab with the strata that a body has under the focus, or None
     if the wavenumber integral does not take it.
     """
-    places = np.vstack([scene.tacton.trajectory.outline, scene.probe_points])
-    slab = flattened(scene.body, places, default_size(scene.body))
-    flat = with_body(scene, slab)
+    flat = with_body(scene, infinite(scene, scene.body))
     if not takes(FLAT_BODY, flat):
         return None
     response = solve(flat, plan(flat, replace(options, model=FLAT_BODY.name)))

@@ -1,10 +1,8 @@
 """Every kind of body at every door: a result with all its parts, or a sentence on what it lacks."""
 
-from dataclasses import replace
-
+import corpus
 import pytest
 
-import meshes
 from skinwave.bodies import KINDS
 from skinwave.commands.cli import main
 from skinwave.report.renderer import renderer
@@ -49,11 +47,8 @@ QUIET = ("--quiet", "--out")
 def blocks(tmp_path_factory):
     """A folder with a block of 24 x 24 x 8 mm, whose lower half is another region."""
     folder = tmp_path_factory.mktemp("blocks")
-    mesh = meshes.block((0.024, 0.024, 0.008), 0.004)
-    deep = mesh.points[mesh.tets[:, :4], 2].mean(axis=1) < mesh.points[:, 2].max() - 4e-3
-    named = replace(mesh, facets={}, region=deep.astype(int), region_names={0: "skin", 1: "deep"})
-    meshes.write(folder / "block.vtu", named)
-    meshes.write(folder / "plain.vtu", replace(mesh, facets={}))
+    corpus.write_block(folder / "block.vtu")
+    corpus.write_block(folder / "plain.vtu", regions=False)
     return folder
 
 

@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
+import corpus
 import numpy as np
 import pytest
 
 import fem
-import meshes
 import simple_model
 import skinwave
 from simple_model import Tacton
@@ -52,10 +52,7 @@ def scene_of(body):
 def folder(tmp_path_factory):
     """A folder with a block of 24 x 24 x 8 mm, whose lower half is another region."""
     folder = tmp_path_factory.mktemp("bodies")
-    mesh = meshes.block((0.024, 0.024, 0.008), 0.004)
-    deep = mesh.points[mesh.tets[:, :4], 2].mean(axis=1) < mesh.points[:, 2].max() - 4e-3
-    named = replace(mesh, facets={}, region=deep.astype(int), region_names={0: "skin", 1: "deep"})
-    meshes.write(folder / "block.vtu", named)
+    corpus.write_block(folder / "block.vtu")
     return folder
 
 
