@@ -24,7 +24,7 @@ Operators are assembled and factorised once. Index letters of einsum in this pac
 """
 
 from fem import nonlinear
-from fem.added_mass import added_mass
+from fem.air import air_around
 from fem.assembly import Operators, assemble
 from fem.boundary import Support
 from fem.coat import Coat
@@ -55,7 +55,7 @@ from simple_model.layers.material import PRESETS
 __all__ = [
     "PRESETS", "Coat", "Complex", "Diverged", "Elastic", "EnergyBalance", "Factor", "LineSolver",
     "Material", "MaxwellBranch", "Membrane", "NotReduced", "Operators", "Poles", "PronyTerm",
-    "ReducedModel", "State", "Support", "Tension", "added_mass", "assemble", "at_rest", "available",
+    "ReducedModel", "State", "Support", "Tension", "air_around", "assemble", "at_rest", "available",
     "displacement_operator", "facet_normals", "facet_points", "factorise", "finite_strain",
     "from_young", "harmonic", "imbalance", "is_inside", "load_operator", "locate",
     "mechanical_energy", "modes", "nonlinear", "of_law", "poles", "probe_operator", "reduce",

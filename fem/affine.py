@@ -9,7 +9,9 @@ Each term q has a kind and belongs to one material r of the body:
     dashpots   sqrt(mu_r rho_r) s R_r
     layer      drag rho_r s D_r, of an absorbing layer
     springs    factor S, of a support
-    fluid      s^2 F, an added mass, which can only be applied (`added_mass`)
+    fluid      s^2 F, the added mass of `air`, which can only be applied
+    friction, monopole, dipole
+               s |s|^p F, the resistances of `air`
 
 Poisson's ratios are fixed, so the projections of the A_q onto one basis serve every material
 (Prud'homme et al., J Fluids Eng 124:70 (2002)). `operators_of` sums them for given materials.
@@ -24,6 +26,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from fem.air import RESISTANCES, Air, damping, growth
 from fem.assembly import Operators, assemble
 from fem.boundary import Support, springs
 from fem.coat import Coat
@@ -34,7 +37,8 @@ from fem.typing import Complex, Floats, Ints
 from meshes import TetMesh
 from simple_model.layers.material import Material
 
-KINDS = ("stiffness", "mass", "dashpots", "layer", "springs", "fluid")  # of terms
+OF_AIR = ("fluid", *RESISTANCES)
+KINDS = ("stiffness", "mass", "dashpots", "layer", "springs", *OF_AIR)  # of terms
 NEGLIGIBLE = 1e-30  # modulus and density of a material that is left out, relative to the others
 RESIDUAL = 1e-8  # relative, of GMRES; a resonance amplifies it about a hundred times
 RESTART, CYCLES = 60, 5  # of GMRES
@@ -74,13 +78,24 @@ class AffineOperators:
         """Added mass of a fluid in kg, or None."""
         return next(iter(self.of("fluid")), None)
 
-    def with_fluid(self, added: LinearOperator) -> "AffineOperators":
-        """Return these operators with the added mass of a fluid."""
-        return replace(self, terms=(*self.terms, ("fluid", 0)), parts=(*self.parts, added))
+    @property
+    def air(self) -> Air | None:
+        """Air around a sheet, or None."""
+        each = {kind: part for (kind, _), part in zip(self.terms, self.parts, strict=True)}
+        if "fluid" not in each:
+            return None
+        losses = {kind: part for kind, part in each.items() if kind in RESISTANCES}
+        return Air(mass=each["fluid"], resistances=losses)
+
+    def with_air(self, air: Air) -> "AffineOperators":
+        """Return these operators with those of the air around a sheet."""
+        more = {"fluid": air.mass, **air.resistances}
+        terms = (*self.terms, *((kind, 0) for kind in more))
+        return replace(self, terms=terms, parts=(*self.parts, *more.values()))
 
     def in_vacuum(self) -> "AffineOperators":
-        """Return the sparse operators, without a fluid."""
-        dry = [q for q, (kind, _) in enumerate(self.terms) if kind != "fluid"]
+        """Return the sparse operators, without air."""
+        dry = [q for q, (kind, _) in enumerate(self.terms) if kind not in OF_AIR]
         terms, parts = (tuple(each[q] for q in dry) for each in (self.terms, self.parts))
         return replace(self, terms=terms, parts=parts)
 
@@ -151,11 +166,13 @@ def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
         MaxwellBranch(K=summed(stiffness=share * mu), time=time)
         for time, share in zip(times.tolist(), shares, strict=True)
     )
+    K, M = summed(stiffness=mu, springs=[solids.springs]), summed(mass=rho, fluid=[1.0])
+    C = summed(stiffness=lags * mu) + R
+    if affine.air:
+        C = C + damping(K, M, affine.air.resistances)
     return Operators(
-        K=summed(stiffness=mu, springs=[solids.springs]), C=summed(stiffness=lags * mu) + R,
-        M=summed(mass=rho, fluid=[1.0]), R=R, free=affine.free, n_dofs=affine.n_dofs,
-        branches=tuple(branches),
-    )  # fmt: skip
+        K=K, C=C, M=M, R=R, free=affine.free, n_dofs=affine.n_dofs, branches=tuple(branches)
+    )
 
 
 def weights(terms: Terms, solids: Solids, frequencies: ArrayLike) -> Complex:
@@ -174,7 +191,9 @@ def weights(terms: Terms, solids: Solids, frequencies: ArrayLike) -> Complex:
                 return s * solids.drag * m.density
             case "springs":
                 return np.full_like(s, solids.springs)
-        return s**2
+            case "fluid":
+                return s**2
+        return s * growth(kind, s.imag)
 
     return np.stack([of_kind(kind, solids.materials[r]) for kind, r in terms], axis=-1)
 
@@ -204,31 +223,32 @@ def line_solution(
     """Return the steady state (n_free,) of a full body at one line, in m, for `weights` (q,) of its
     matrices and a force (n_free,) in N.
 
-    The added mass F of a fluid can only be applied. P = A - w F + E is factorised, where E is the
+    The operators F of air can only be applied. P = A - sum w F + E is factorised, where E is the
     equivalent added mass of the bending waves of this line, `fluid_share` of the body's own mass.
-    Waves with other wavenumbers do not resonate, so P^-1 (P + w F - E) is near the identity and
+    Waves with other wavenumbers do not resonate, so P^-1 (P + sum w F - E) is near the identity and
     GMRES needs few iterations. Raises Diverged if GMRES does not converge.
     """
     dry = affine.in_vacuum()
     is_mass = np.array([kind == "mass" for kind, _ in dry.terms])
-    own = weights[: len(is_mass)]
+    own, around = np.split(weights, [len(is_mass)])
     factorise = SumFactoriser([sparse.csr_array(part) for part in dry.parts], backend=solver)
     factor = factorise(own * (1 + fluid_share * is_mass))
     force = force.astype(np.complex128)
-    if affine.fluid is None:
+    if not len(around):
         return factor.solve(force)
     E = fluid_share * sum(w * M for w, M in zip(own[is_mass], dry.of("mass"), strict=True))
-    return _solve_with_fluid(factor.solve, weights[-1], affine.fluid, E, force)
+    air = zip(around, affine.parts[len(is_mass) :], strict=True)
+    return _solve_with_air(factor.solve, list(air), E, force)
 
 
-def _solve_with_fluid(
-    solve: Callable[[Complex], Complex], w: complex, F: LinearOperator, E: Any, force: Complex
+def _solve_with_air(
+    solve: Callable[[Complex], Complex], air: Sequence[tuple[complex, Any]], E: Any, force: Complex
 ) -> Complex:
-    """Solve P u + w F u - E u = force, where `solve` solves with P."""
+    """Solve P u + sum w F u - E u = force, where `solve` solves with P."""
 
     def preconditioned(u: Complex) -> Complex:
-        fluid = F @ np.column_stack([u.real, u.imag])  # F takes real fields
-        return u + solve(w * (fluid @ [1, 1j]) - E @ u)
+        parts = np.column_stack([u.real, u.imag])  # F takes real fields
+        return u + solve(sum(w * ((F @ parts) @ [1, 1j]) for w, F in air) - E @ u)
 
     n = len(force)
     system = LinearOperator((n, n), matvec=preconditioned, dtype=np.complex128)

@@ -105,7 +105,7 @@ def reduce_affine(
         full = training[t].geometry()
         reduced = reduce(
             operators_of(full.affine.in_vacuum(), training[t].solids), full.probes, band,
-            tolerance / 2, loads=full.loads, added=full.affine.fluid, solver=solver,
+            tolerance / 2, loads=full.loads, air=full.affine.air, solver=solver,
             progress=lambda x: progress((step + x) / (step + 2)),  # noqa: B023
         )  # fmt: skip
         smaller = basis.shape[1] or int(NESTED * reduced.basis.shape[1])

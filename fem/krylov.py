@@ -27,8 +27,9 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, aslinearoperator
+from scipy.sparse.linalg import aslinearoperator
 
+from fem.air import Air, damping
 from fem.assembly import Operators
 from fem.combination import Laws, factors_at
 from fem.harmonic import dynamic_stiffness
@@ -69,7 +70,7 @@ def reduce(
     tolerance: float = 1e-3,
     *,
     loads: Floats | None = None,
-    added: LinearOperator | None = None,
+    air: Air | None = None,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> ReducedModel:
@@ -84,7 +85,7 @@ def reduce(
     tolerance : relative error of the probes' displacement at any frequency of the band
     loads : (3 n, k) float, typical nodal forces for the error estimate. Without them, the error is
         that of the probes' adjoint fields in the whole body, which needs far more moments.
-    added : added mass of a fluid, from `added_mass`; the body must then be constrained
+    air : around a sheet, from `air_around`; the body must then be constrained
     solver : backend of `factorise`
     progress : called with the fraction done as the error estimate approaches the tolerance
 
@@ -114,7 +115,7 @@ def reduce(
     start_vectors = probes[:, free].toarray().T
     if not start_vectors.any():
         raise ValueError("all probes lie where the body is fixed; move one to a free point")
-    point, operators = _expansion(operators, added, band)
+    point, operators = _expansion(operators, air, band)
     laws = operators.combinations()
     factors = factors_at(operators.branches, point)
     factor = factorise(laws.dynamic_stiffness(factors, operators.K, operators.M), backend=solver)
@@ -131,13 +132,19 @@ def reduce(
     backend = factor.backend
     del factor  # the basis needs its memory
     K, C, M, branches = space.model(size)
+    basis = space.on_all_dofs(size)
+    if air is not None:
+        of_free = basis[free]
+        C = C + damping(
+            K, M, {name: of_free.T @ (R @ of_free) for name, R in air.resistances.items()}
+        )
     small = Operators(
         K=K.copy(), C=C.copy(), M=M, R=space.radiation(operators.R, size), branches=branches,
         free=np.arange(size), n_dofs=size,
     )  # fmt: skip
     outputs = space.rows(size)[:, : start_vectors.shape[1]].T.copy()
     return ReducedModel(
-        operators=small, basis=space.on_all_dofs(size), outputs=outputs, moments=moments,
+        operators=small, basis=basis, outputs=outputs, moments=moments,
         estimate=estimate, solver=backend,
     )  # fmt: skip
 
@@ -296,14 +303,12 @@ def _iterate(
     )
 
 
-def _expansion(
-    operators: Operators, added: LinearOperator | None, band: float
-) -> tuple[float, Operators]:
+def _expansion(operators: Operators, air: Air | None, band: float) -> tuple[float, Operators]:
     """Return the expansion point in rad/s, and the operators with the added mass."""
-    if added is None:
+    if air is None:
         relaxing = 2 * np.pi * RELAXING_POINT * band
         return relaxing if operators.branches else EXPANSION_POINT, operators
-    return 0.0, replace(operators, M=aslinearoperator(operators.M) + added)
+    return 0.0, replace(operators, M=aslinearoperator(operators.M) + air.mass)
 
 
 def _independent(start_vectors: Floats) -> Floats:

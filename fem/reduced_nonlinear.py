@@ -21,6 +21,7 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.linalg import LinearOperator
 
+from fem.air import Air, damping
 from fem.assembly import Operators
 from fem.energy import Elastic, Relaxing
 from fem.finite_strain import (
@@ -66,17 +67,20 @@ def stretching_modes(
     membrane: Membrane,
     n: int,
     *,
-    added: LinearOperator | None = None,
+    air: Air | None = None,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> StretchingModes:
     """Reduce a sheet, given by linear operators and its whole membrane, to its n lowest bending
-    modes; with the added mass of a fluid, to combinations of them. Raises Diverged if the modes do
+    modes; in air, to combinations of them. Raises Diverged if the modes do
     not converge.
     """
     hz, shapes = modes(operators, n, solver=solver)
-    if added is not None:
-        hz, shapes = _with_added(operators, added, hz, shapes)
+    of_air = np.zeros((n, n))
+    if air is not None:
+        hz, shapes = _with_added(operators, air.mass, hz, shapes)
+        each = {name: _project(R, shapes[operators.free]) for name, R in air.resistances.items()}
+        of_air = damping(np.diag((2 * np.pi * hz) ** 2), np.eye(n), each)
     part = membrane_part(mesh, membrane)
     w = shapes.reshape(-1, 3, n)[:, 2]
     slopes = (part.D @ w).reshape(*part.G.shape[:3], n)  # (e, q, k, m)
@@ -91,7 +95,7 @@ def stretching_modes(
             progress(k / len(states))
     modal = Operators(
         K=sparse.diags_array((2 * np.pi * hz) ** 2).tocsr(),
-        C=sparse.csr_array(_project(operators.C, shapes[operators.free])),
+        C=sparse.csr_array(_project(operators.C, shapes[operators.free]) + of_air),
         M=sparse.eye_array(n).tocsr(), R=sparse.csr_array((n, n)), free=np.arange(n), n_dofs=n,
         branches=tuple(
             replace(branch, K=sparse.csr_array(_project(branch.K, shapes[operators.free])))

@@ -14,6 +14,7 @@ import numpy as np
 from simple_model.layers.layered import clearance, surface_compliance
 from simple_model.layers.material import Material
 from simple_model.layers.stack import Stack
+from simple_model.load.focus import SPEED_OF_SOUND
 from simple_model.typing import Complex
 
 
@@ -31,7 +32,7 @@ class Compliance:
         return self.answer(k, w)
 
 
-AIR_DENSITY = 1.2  # kg/m3
+AIR_DENSITY, AIR_VISCOSITY = 1.2, 1.82e-5  # kg/m3, Pa s
 
 
 def layered(stack: Stack) -> Compliance:
@@ -89,19 +90,26 @@ def thin_sheet(
 ) -> Compliance:
     """Return the compliance of an infinite thin sheet with air on both sides.
 
-        G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2],  m = rho d,  D* = mu* d^3 / 6 (1 - nu)
+        G = 1 / [D* k^4 + T k^2 - (m + 2 rho/sqrt(k^2 - w^2/c^2) + 2 sqrt(eta rho / i w)) w^2]
 
-    for a thickness d in m, a tension T in N/m and an air density in kg/m3. Its static deflection is
-    unbounded, so G = 0 at w = 0. The `correction` returns factors of D* and m, as `thick_plate`.
+    with m = rho_solid d and D* = mu* d^3 / 6 (1 - nu) for a thickness d in m, a tension T in N/m,
+    an air density rho in kg/m3, its speed of sound c and viscosity eta: sound, and the layer of
+    viscous air beside the sheet as in `plates.air`. The static deflection is unbounded, so G = 0 at
+    w = 0. The `correction` returns factors of D* and m, as `thick_plate`.
     """
     mass_per_area = material.density * thickness
 
     def bending(w: Complex) -> Complex:
         return np.asarray(material.complex_modulus(w) * thickness**3 / (6 * (1 - material.poisson)))
 
+    def friction(w: Complex) -> Complex:
+        """Mass per area that stands for the resistance of viscous air."""
+        return np.asarray(2 * np.sqrt(air_density * AIR_VISCOSITY / (1j * np.where(w, w, 1.0))))
+
     def compliance(k: Complex, w: Complex) -> Complex:
         softer, heavier = correction(k * thickness, material.poisson)
-        inertia = (heavier * mass_per_area + 2 * air_density / k) * w**2
+        air = 2 * air_density / np.sqrt(k**2 - (w / SPEED_OF_SOUND) ** 2) + friction(w)
+        inertia = (heavier * mass_per_area + air) * w**2
         stiffness = softer * bending(w) * k**4 + tension * k**2
         return np.where(w == 0, 0, 1 / (stiffness - inertia))
 
@@ -109,7 +117,7 @@ def thin_sheet(
         companion = np.zeros((len(w), 5, 5), np.complex128)
         companion[:, range(1, 5), range(4)] = 1
         companion[:, 0, 1] = -tension / bending(w)
-        companion[:, 0, 3] = mass_per_area * w**2 / bending(w)
+        companion[:, 0, 3] = (mass_per_area + friction(w)) * w**2 / bending(w)
         companion[:, 0, 4] = 2 * air_density * w**2 / bending(w)
         k = np.linalg.eigvals(companion)
         decaying = (k.real > 0) & (k.imag > 0.1 * np.abs(k))

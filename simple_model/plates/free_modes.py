@@ -1,13 +1,14 @@
 """Free vibration of a plate's modes with Maxwell branches in bending.
 
-A mode of squared frequency w^2, of which bending makes the share e, has the dynamic stiffness
+A mode of squared frequency w^2, of which bending makes the share e, and of damping c by air and
+edges, has the dynamic stiffness D(s) = s^2 + c s + w^2 [1 - e + e h(s)] with
 
-    D(s) = s^2 + w^2 [1 - e + e h(s)],   h(s) = h_0 + lag s + sum_j h_j s tau_j / (1 + s tau_j),
+    h(s) = h_0 + lag s + sum_j h_j s tau_j / (1 + s tau_j),
 
 and, by its poles p, the compliance 1 / D(s) = sum_p 1 / (D'(p) (s - p)): a vibration, and the creep
 of each branch. Poles are eigenvalues of the equations with the stretches d_j of the branches,
 
-    u'' = -w^2 [(1 - e + e h_0) u + e lag u' + e sum_j h_j d_j],   d_j' = u' - d_j / tau_j.
+    u'' = -c u' - w^2 [(1 - e + e h_0) u + e lag u' + e sum_j h_j d_j],   d_j' = u' - d_j / tau_j.
 """
 
 from dataclasses import dataclass
@@ -85,7 +86,9 @@ def free_modes(modes: PlateModes, material: Material) -> FreeModes:
     """Poles and residues of the modes of a plate whose material has no modulus law."""
     squared = np.maximum(modes.squared, np.finfo(float).tiny)
     bent = squared * modes.elastic
-    return free_vibration(*relaxing_stiffness(squared - bent, bent, material))
+    stiffness, times = relaxing_stiffness(squared - bent, bent, material)
+    stiffness[:, 1] += modes.damping
+    return free_vibration(stiffness, times)
 
 
 def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tuple[Floats, Floats]:

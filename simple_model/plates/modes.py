@@ -4,35 +4,33 @@ Ritz's method: w(x, y) = sum c_ij X_i(x) Y_j(y) makes the energies stationary (L
 Plates (1969), eqs. 9.4 and 10.1; orthotropic: Timoshenko and Woinowsky-Krieger, section 85)
 
     2 U = iint D11 w_xx^2 + 2 D12 w_xx w_yy + D22 w_yy^2 + 4 D66 w_xy^2 + Tx w_x^2 + Ty w_y^2 dA
-    2 T = w^2 iint m w^2 dA + w^2 rho/pi iint iint w(x) w(y) / |x - y| dA dA
+    2 T = w^2 iint m w^2 dA + the energy of the air on both sides, see `air`
 
 X_i and Y_j are combinations of Legendre polynomials that meet the supports of the edges; the
 conditions at a free edge follow from the energies. A clip holds a square: the polynomials between
 its sides are separate, and products that would move it are left out. If a plate is symmetric about
-its middle, even and odd modes separate. The second term of T is the air on both sides of a plate in
-a baffle, 2 rho / k at each wavenumber k: see `air`.
+its middle, even and odd modes separate.
 
 Tension has no loss, so the complex modulus of bending couples the modes of a stretched plate, close
-modes most.
+modes most. So does the sound that they radiate. Lossy edges take from each mode a share of the
+energy of its tension and bending: a support with a complex compliance does, the same share of all
+modes that are much shorter than the plate.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import product
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg, sparse
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from simple_model.choices import check_numbers, choose
 from simple_model.layers.compliance import AIR_DENSITY
 from simple_model.layers.material import ModulusLaw
-from simple_model.plates.air import air_mass
+from simple_model.plates.air import AirLoss, air_of
 from simple_model.plates.polynomials import LineBasis, line_basis, piecewise_basis
-from simple_model.typing import Bools, Complex, Floats
+from simple_model.typing import Bools, Complex, Floats, Ints
 
 SUPPORTS = ("clamped", "simply", "free")
 FINEST = 350.0  # rad/m: higher wavenumbers have a third of the force of a 4.35 mm focal spot
@@ -42,8 +40,11 @@ SAME_SIDE = 0.01  # of the radius of a clip: sides and edges closer than that co
 LAYER = 0.1  # of the radius of a clip, width of a piece along its sides
 SHIFT = 1e-12  # of the mean squared frequency
 MOST_DOFS = 6000  # of one symmetry, for some minutes
-COUPLED = 1.5  # of the frequency of a line: higher modes are almost uncoupled
-RESIDUAL = 1e-6  # relative, of the solution for coupled modes
+TIE = 1e-9  # of the mass, for sound: equal frequencies have one mode that radiates, others do not
+COUPLED = 1.3  # of the frequency of a line: modes below 1 / 1.3 or above 1.3 are almost uncoupled
+RESIDUAL = 1e-11  # of the largest force, of the solution for coupled modes
+SWEEPS = 25  # that a line may need
+LINES_AT_ONCE = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +62,8 @@ class Plate:
     clips : ((x, y), ...) m, where the plate is fixed
     clip_radius : m, half a side of the fixed square; 0 fixes the deflection of a point only
     air_density : kg/m3, 0 in vacuum
+    baffle : whether a rigid wall around the plate separates the air on both sides
+    edge_loss : share of the energy of a mode that the edges take in a cycle, over 2 pi
 
     Raises a ValueError if a value is out of range or a clip is off the plate.
     """
@@ -81,10 +84,12 @@ class Plate:
     clips: tuple[tuple[float, float], ...] = ()
     clip_radius: float = 0.0
     air_density: float = AIR_DENSITY
+    baffle: bool = True
+    edge_loss: float = 0.0
 
     def __post_init__(self) -> None:
         check_numbers("a plate", self, "size_x", "size_y", "d11", "d22", "d66", "mass_per_area")
-        more = ("tension_x", "tension_y", "clip_radius", "air_density")
+        more = ("tension_x", "tension_y", "clip_radius", "air_density", "edge_loss")
         check_numbers("a plate", self, *more, least="0 or above")
         if not self.d12**2 < self.d11 * self.d22:
             raise ValueError(
@@ -104,8 +109,8 @@ class Plate:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Family:
     """Modes of one symmetry: `squared` (m,) angular frequencies in rad2/s2, ascending; stiffness of
-    `bending` (m, m) between them, None without tension; and coefficients `shapes` (i, j, m) on `x`,
-    `y`.
+    `bending` (m, m) between them, None without tension; coefficients `shapes` (i, j, m) on `x` and
+    `y`; and what the `air` takes from them, None in vacuum.
     """
 
     x: LineBasis
@@ -113,6 +118,7 @@ class Family:
     squared: Floats
     bending: Floats | None
     shapes: Floats
+    air: AirLoss | None
 
     @property
     def elastic(self) -> Floats:
@@ -131,9 +137,26 @@ class PlateModes:
     families: tuple[Family, ...]
 
     @property
+    def parts(self) -> Iterator[tuple[Family, slice]]:
+        """Families, and the place of each in arrays of all modes."""
+        first = 0
+        for family in self.families:
+            yield family, slice(first, first := first + len(family.squared))
+
+    @property
     def squared(self) -> Floats:
         """Squared angular frequencies (m,) in rad2/s2, family by family."""
         return np.concatenate([family.squared for family in self.families])
+
+    @property
+    def damping(self) -> Floats:
+        """Viscous damping (m,) in 1/s by air and edges, of each mode at its own frequency."""
+        omega = np.sqrt(np.maximum(self.squared, 0.0))
+        damping = self.plate.edge_loss * omega
+        for family, part in self.parts:
+            if family.air is not None:
+                damping[part] += family.air.at_own(omega[part])
+        return np.asarray(damping)
 
     @property
     def elastic(self) -> Floats:
@@ -188,15 +211,15 @@ def scaled_modes(modes: PlateModes, *, bending: Floats, mass: Floats) -> PlateMo
     """Return modes whose stiffness of bending is multiplied by `bending` (m,) and whose modal mass
     by `mass` (m,), again of unit modal mass.
     """
-    families, first = [], 0
-    for family in modes.families:
-        part = slice(first, first := first + len(family.squared))
+    families = []
+    for family, part in modes.parts:
         softer, heavier, share = bending[part], mass[part], family.elastic
         root = np.sqrt(softer / heavier)
         families.append(replace(
             family, squared=family.squared * (1 - share + share * softer) / heavier,
             bending=None if family.bending is None else root[:, None] * family.bending * root,
             shapes=family.shapes / np.sqrt(heavier),
+            air=family.air and family.air.scaled(1 / np.sqrt(heavier)),
         ))  # fmt: skip
     return replace(modes, families=tuple(families))
 
@@ -207,20 +230,20 @@ def modal_motion(
     """Steady modal coordinates q (f, m) in m kg^1/2 under modal forces (f, m) in N kg^-1/2 at
     frequencies (f,) in Hz.
 
-    They solve (diag(w_m^2) + (h - 1) B - w^2) q = force, with the stiffness B of bending between
-    the modes and its relative modulus h: `modulus` maps angular frequencies (...) in rad/s to the
-    complex modulus (...) over that of the modes. Raises an ArithmeticError if coupled modes are not
-    solved to `RESIDUAL`.
+    They solve (diag(w_m^2) + (h - 1) B + i w R - w^2) q = force, with the stiffness B of bending
+    between the modes, its relative modulus h, and the resistance R of air and edges: `modulus` maps
+    angular frequencies (...) in rad/s to the complex modulus (...) over that of the modes.
     """
-    w = 2 * np.pi * np.asarray(frequencies)
+    w = 2 * np.pi * np.asarray(frequencies, np.float64)
     added = np.broadcast_to(modulus(w) - 1, w.shape)
-    coordinates = modal_motion_apart(modes, frequencies, forces, modulus)
-    first = 0
-    for family in modes.families:
-        part = slice(first, first := first + len(family.squared))
-        if family.bending is not None:
-            lossy = np.flatnonzero(added)
-            coordinates[lossy, part] = _solve(family, w[lossy], added[lossy], forces[lossy, part])
+    coordinates = np.empty(forces.shape, np.complex128)
+    for family, part in modes.parts:
+        own = _own_stiffness(family, modes.plate.edge_loss, w, added)
+        couples = (family.bending is not None) & (added != 0) | (family.air is not None) & (w > 0)
+        coordinates[:, part] = forces[:, part] / own
+        for some in _chunks(np.flatnonzero(couples)):
+            system = _Coupled.of(family, w[some], added[some], own[some])
+            coordinates[some, part] = system.solve(forces[some, part])
     return coordinates
 
 
@@ -228,53 +251,104 @@ def modal_motion_apart(
     modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
 ) -> Complex:
     """Modal coordinates (f, m) as in `modal_motion`, without coupling between modes."""
-    w = 2 * np.pi * np.asarray(frequencies)[:, None]
-    bending = modulus(w) * modes.elastic
-    coordinates = forces / (modes.squared * (1 - modes.elastic + bending) - w**2)
-    return np.asarray(coordinates, np.complex128)
+    w = 2 * np.pi * np.asarray(frequencies, np.float64)
+    added, edge = np.broadcast_to(modulus(w) - 1, w.shape), modes.plate.edge_loss
+    own = [_own_stiffness(family, edge, w, added) for family in modes.families]
+    return np.asarray(forces / np.hstack(own), np.complex128)
 
 
-def _solve(family: Family, w: Floats, added: Complex, forces: Complex) -> Complex:
-    """Modal coordinates (f, m) of a stretched plate, by GMRES. The preconditioner solves low modes
-    together and high modes separately.
+def _own_stiffness(family: Family, edge_loss: float, w: Floats, added: Complex) -> Complex:
+    """Dynamic stiffness (f, m) of each mode alone, in 1/s2."""
+    own = family.squared * (1 + np.multiply.outer(added, family.elastic)) - w[:, None] ** 2
+    if edge_loss:
+        omega = np.sqrt(np.maximum(family.squared, 0.0))
+        own = own + 1j * edge_loss * np.multiply.outer(w, omega)
+    if family.air is not None:
+        own = own + 1j * w[:, None] * family.air.of_each(w)
+    return np.asarray(own, np.complex128)
+
+
+def _chunks(lines: Ints) -> list[Ints]:
+    return np.array_split(lines, -(-len(lines) // LINES_AT_ONCE)) if len(lines) else []
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Coupled:
+    """Coupled modes of a family at angular frequencies `w` (f,): dynamic stiffnesses `own` (f, m)
+    of each mode, `added` (f,) times `bending` (m, m) without its diagonal, and the `sound` (f, q,
+    q) of `patterns` (q, m), of which `own` has the diagonals `alone` (f, m).
     """
-    assert family.bending is not None
-    coordinates, B = np.empty(forces.shape, np.complex128), family.bending
-    _, first, which = np.unique(np.round(w, 6), return_index=True, return_inverse=True)
-    for each, k in enumerate(first.tolist()):
-        n = int(np.searchsorted(family.squared, (COUPLED * w[k]) ** 2))
-        low = added[k] * B[:n, :n]
-        low[np.diag_indices(n)] += family.squared[:n] - w[k] ** 2
-        factor = linalg.lu_factor(low, check_finite=False) if n else None
-        own = family.squared * (1 + added[k] * family.elastic) - w[k] ** 2
-        of_mode = partial(_low_together, factor, own, n)
-        full = partial(_modal_forces, B, added[k], family.squared - w[k] ** 2)
-        size = len(family.squared)
-        system, before = (
-            LinearOperator((size, size), matvec=f, dtype=np.complex128) for f in (full, of_mode)
+
+    squared: Floats
+    w: Floats
+    own: Complex
+    added: Complex
+    bending: Floats
+    patterns: Floats
+    sound: Complex
+    alone: Complex
+
+    @staticmethod
+    def of(family: Family, w: Floats, added: Complex, own: Complex) -> "_Coupled":
+        m = len(family.squared)
+        bending = np.zeros((m, m)) if family.bending is None else family.bending.copy()
+        bending[np.diag_indices(m)] = 0.0
+        patterns, sound = np.zeros((0, m)), np.zeros((len(w), 0, 0))
+        if family.air is not None:
+            patterns, sound = family.air.patterns, family.air.radiation(w)
+        dynamic = np.asarray(1j * w[:, None, None] * sound, np.complex128)
+        return _Coupled(
+            squared=family.squared, w=w, own=own, added=added, bending=bending, patterns=patterns,
+            sound=dynamic, alone=((dynamic @ patterns) * patterns).sum(axis=1),
+        )  # fmt: skip
+
+    def between(self, q: Complex) -> Complex:
+        """Forces (f, m) of all other modes."""
+        bent = q.real @ self.bending + 1j * (q.imag @ self.bending)  # real, which is faster
+        radiated = (self.sound @ (q @ self.patterns.T)[..., None])[..., 0] @ self.patterns
+        return np.asarray(self.added[:, None] * bent + radiated - self.alone * q)
+
+    def block(self, k: int, modes: slice) -> Complex:
+        """Dynamic stiffness (n, n) of some modes at a line."""
+        near = self.patterns[:, modes]
+        block = self.added[k] * self.bending[modes, modes] + near.T @ self.sound[k] @ near
+        block[np.diag_indices(len(block))] += (self.own - self.alone)[k, modes]
+        return np.asarray(block)
+
+    def solve(self, forces: Complex) -> Complex:
+        """Coordinates (f, m) under forces (f, m), iterated with modes near a line solved together
+        and all others alone.
+        """
+        low, high = (
+            np.searchsorted(self.squared, (self.w * factor) ** 2)
+            for factor in (1 / COUPLED, COUPLED)
         )
-        for line in np.flatnonzero(which == each).tolist():  # of several loads
-            coordinates[line], failed = gmres(
-                system, forces[line], M=before, rtol=RESIDUAL, maxiter=10
-            )
-            if failed:
-                raise ArithmeticError(
-                    f"the coupled modes of a stretched plate do not converge to a residual of "
-                    f"{RESIDUAL:g} at {w[k] / 2 / np.pi:.4g} Hz; lower its loss"
-                )
-    return coordinates
+        near = [slice(*each) for each in zip(low.tolist(), high.tolist(), strict=True)]
+        factors = [
+            linalg.lu_factor(self.block(k, modes), check_finite=False)
+            if modes.stop > modes.start
+            else None
+            for k, modes in enumerate(near)
+        ]
 
+        def together(left: Complex) -> Complex:
+            q = left / self.own
+            for k, (modes, factor) in enumerate(zip(near, factors, strict=True)):
+                if factor is not None:
+                    q[k, modes] = linalg.lu_solve(factor, left[k, modes], check_finite=False)
+            return np.asarray(q)
 
-def _low_together(factor: Any, own: Complex, n: int, forces: Complex) -> Complex:
-    coordinates = forces / own
-    if n:
-        coordinates[:n] = linalg.lu_solve(factor, forces[:n], check_finite=False)
-    return coordinates
-
-
-def _modal_forces(B: Floats, added: complex, diagonal: Floats, q: Complex) -> Complex:
-    bent = B @ np.column_stack([q.real, q.imag])  # real, which is faster
-    return np.asarray(diagonal * q + added * (bent @ [1, 1j]))
+        allowed = RESIDUAL * np.abs(forces).max(axis=1)
+        q = together(forces)
+        for _ in range(SWEEPS):
+            left = forces - self.own * q - self.between(q)
+            open_lines = ~(np.abs(left).max(axis=1) <= allowed)
+            if not open_lines.any():
+                return q
+            q = q + together(left)
+        for k in np.flatnonzero(open_lines).tolist():
+            q[k] = np.linalg.solve(self.block(k, slice(None)), forces[k])
+        return q
 
 
 def _symmetries(plate: Plate) -> tuple[bool, bool]:
@@ -324,9 +398,15 @@ def _apart(first: Sequence[float], others: Sequence[float], end: float, gap: flo
 
 def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     bending, stretching = _stiffness(plate, x, y)
-    mass = np.asarray(plate.mass_per_area * np.kron(x.mass, y.mass), np.float64)
+    area = np.kron(x.mass, y.mass)
+    mass = np.asarray(plate.mass_per_area * area, np.float64)
+    patterns, orders = np.zeros((0, len(mass))), np.zeros((0, 2), np.int64)
     if plate.air_density:
-        mass += air_mass(x, y, plate.air_density)
+        added, patterns, orders = air_of(x, y, plate.air_density, baffle=plate.baffle)
+        mass += added
+        for radiating in patterns[:1]:
+            unit = radiating / np.linalg.norm(radiating)
+            mass += TIE * plate.mass_per_area * np.outer(unit, unit)
     K = bending if stretching is None else bending + stretching
     free = _free_of_clips(plate, x, y)
     if free is None:
@@ -336,9 +416,16 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
         squared, shapes = _modes(*reduced)
         shapes = free @ shapes
     between = None if stretching is None else np.asarray(shapes.T @ (bending @ shapes))
+    air = None
+    if plate.air_density:
+        air = AirLoss(
+            patterns=patterns @ shapes, orders=orders,
+            areas=(shapes * (area @ shapes)).sum(axis=0), density=plate.air_density,
+        )  # fmt: skip
     return Family(
-        x=x, y=y, squared=squared, bending=between, shapes=shapes.reshape(x.size, y.size, -1)
-    )
+        x=x, y=y, squared=squared, bending=between, air=air,
+        shapes=shapes.reshape(x.size, y.size, -1),
+    )  # fmt: skip
 
 
 def _modes(K: Floats, M: Floats) -> tuple[Floats, Floats]:

@@ -41,6 +41,7 @@ from skinwave.system import extensions
 from skinwave.typing import Floats
 
 KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
+AIR: dict[bool | str, bool | str] = {False: False, True: "free"}  # in short
 LARGEST = 2.0  # m: larger numbers are probably in mm
 
 
@@ -68,7 +69,8 @@ class Body:
         bone in soft tissue
     file, unit, up : of a mesh, see `meshes.body_from_file`
     placement : position and rotation under the device
-    air : bool, whether air moves with both sides of a sheet, as in a baffle; False for vacuum
+    air : False for a sheet in vacuum; "free" (or True) if air flows around its edges, "baffle" if a
+        large rigid wall around the sheet separates both sides
     mounting : Mounting, the supports and the tension of a sheet
 
     Raises a ValueError if a value is unknown, not finite or out of range.
@@ -93,11 +95,12 @@ class Body:
     up: str = "+z"
     regions: tuple[tuple[str, str | Material], ...] = ()
     placement: Placement = FLAT
-    air: bool = False
+    air: bool | str = False
     mounting: Mounting = FRAME
 
     def __post_init__(self) -> None:
         kind = self.of_kind
+        object.__setattr__(self, "air", AIR.get(self.air, self.air))
         check_material(self.material)
         check_base(self.base, self.base_stiffness, depth=self.depth, is_plate=kind.is_plate)
         object.__setattr__(self, "sides", complete_sides(self.sides, kind.named_sides, self.kind))
@@ -130,6 +133,13 @@ class Body:
         """Refuse properties that only a sheet has, and supports that contradict each other."""
         if self.solid.orthotropy is not None and not self.of_kind.is_plate:
             raise ValueError("an orthotropic material is for a sheet; use an isotropic material")
+        if self.air:
+            choose("air", str(self.air), ("free", "baffle"))
+        if self.air == "baffle" and self.sides == "clamped" and not self.mounting.is_frame:
+            raise ValueError(
+                f'air = "baffle" needs a sheet in a frame, not one {self.mounting.words}; '
+                'hold all edges, or use air = "free"'
+            )
         if self.mounting == FRAME:
             return
         if self.sides != "clamped":

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator
 
-from fem.added_mass import added_mass
+from fem.air import Air, air_around
 from fem.finite_strain import Membrane, shell_stiffness
 from fem.plane_stiffness import Tension
 from meshes import TetMesh, middle_plane, sheet
@@ -29,7 +28,7 @@ SHEET_CELLS = 60  # along the shorter side: f1 within 0.1 %, deflection within 0
 SHEET_THICKNESS = 0.01
 CLIP_THICKNESS = 0.1  # over the radius of a clip: frequencies within 0.15 % of a thin plate
 PAPER = {"depth": 1e-4, "base": "free", "sides": "clamped"}
-PAPER_SIZE = {"material": "paper-grain", "air": True, **PAPER}
+PAPER_SIZE = {"material": "paper-grain", "air": "free", **PAPER}
 AIR_ITERATIONS = 30  # each leaves at most a quarter of the error
 
 
@@ -145,29 +144,24 @@ def air_mass(body: Body, frequency: float) -> float:
     return 2 * AIR_DENSITY / bending_wavenumber(body, frequency)
 
 
-def open_air(body: Body) -> str:
-    """Return in words how a sheet with air around free edges is held, or an empty text."""
-    if not body.air or (body.sides == "clamped" and body.mounting.is_frame):
-        return ""
-    return body.mounting.words if body.sides == "clamped" else f"with {body.sides} sides"
-
-
-def refuse_open_air(body: Body) -> None:
-    """Refuse air that flows around a free edge, which elements do not model."""
-    if how := open_air(body):
+def refuse_unheld_air(body: Body) -> None:
+    """Refuse air around a sheet that is not held by its edges."""
+    if body.air and body.sides != "clamped":
         raise ValueError(
-            f"finite elements model air around a sheet in a frame, not around one {how}; remove "
-            "its air"
+            f"finite elements model air around a sheet that is held, not with {body.sides} sides; "
+            "remove its air"
         )
 
 
-def air(body: Body, build: Build, free: Ints) -> LinearOperator | None:
-    """Return the added mass in kg of the air around a meshed sheet, or None in vacuum."""
+def air(body: Body, build: Build, free: Ints) -> Air | None:
+    """Return the air around a meshed sheet, or None in vacuum."""
     if not body.air:
         return None
-    refuse_open_air(body)
-    sides = body.placement.rotation.T[:2]
-    return added_mass(build.mesh, free, AIR_DENSITY, axes=sides, mirrored=build.symmetry)
+    refuse_unheld_air(body)
+    return air_around(
+        build.mesh, free, AIR_DENSITY, baffle=body.air == "baffle",
+        axes=body.placement.rotation.T[:2], mirrored=build.symmetry,
+    )  # fmt: skip
 
 
 SHEET = register(

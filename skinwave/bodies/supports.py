@@ -124,6 +124,7 @@ class Mounting:
     tension_x, tension_y : float, N/m, uniform, 0 or above
     curl_x, curl_y : float, m, height of the middle above the edges, between left and right and
         between front and back; the sheet is an unstressed parabola
+    edge_loss : loss factor by the edges, of each mode at its own frequency
 
     Raises a ValueError if a value is unknown or out of range, or the sheet is unconstrained.
     """
@@ -136,13 +137,15 @@ class Mounting:
     tension_y: float = 0.0
     curl_x: float = 0.0
     curl_y: float = 0.0
+    edge_loss: float = 0.0
 
     def __post_init__(self) -> None:
         for edge in self.edges:
             choose("edge", edge, EDGES)
         object.__setattr__(self, "edges", tuple(edge for edge in EDGES if edge in self.edges))
         choose("support", self.support, SUPPORTS)
-        check_numbers("a sheet", self, "tension_x", "tension_y", "clip_radius", least="0 or above")
+        numbers = ("tension_x", "tension_y", "clip_radius", "edge_loss")
+        check_numbers("a sheet", self, *numbers, least="0 or above")
         if not (self.edges or self.clips):
             raise ValueError(
                 "the sheet is unconstrained without edges and clips_mm; give one of them"
@@ -198,6 +201,8 @@ class Mounting:
             held.append(f"stretched by {self.tension_x:g} and {self.tension_y:g} N/m along x and y")
         if self.is_curled:
             held.append(f"curled by {1e3 * self.curl_x:g} and {1e3 * self.curl_y:g} mm along them")
+        if self.edge_loss:
+            held.append(f"with a loss factor of {self.edge_loss:g} by its edges")
         return " and ".join(held)
 
 

@@ -1,10 +1,11 @@
 """Packs of sheets: modes of a thin plate by Ritz's method that focal spots move.
 
-    (diag(squared) + c(w) B - w^2) q = F
+    (diag(squared) + c(w) B + i w diag(damping) - w^2) q = F
 
 where B is the stiffness of bending between the modes and c its complex modulus over that of the
-modes, minus 1. The fields of the modes are given on a square grid. The force of a focal spot on a
-mode is the field of the mode, smoothed by the spot.
+modes, minus 1; air and edges damp each mode as at its own frequency. The fields of the modes are
+given on a square grid. The force of a focal spot on a mode is the field of the mode, smoothed by
+the spot.
 """
 
 from math import hypot
@@ -58,7 +59,10 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     bent, stretched = np.diagonal(bending), modes.plate.tension_x or modes.plate.tension_y
     coupled = int(np.searchsorted(squared, (2 * np.pi * COUPLED_BAND) ** 2))
     solid = relaxing(body, FIT_TOLERANCE).solid
-    free = free_vibration(*relaxing_stiffness(squared - bent, bent, solid))
+    damping = modes.damping @ turn**2
+    stiffness, times = relaxing_stiffness(squared - bent, bent, solid)
+    stiffness[:, 1] += damping
+    free = free_vibration(stiffness, times)
     tacton = Tacton(am_frequency=TYPICAL, duration=0.1)
     scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=(tuple(middle),))
     thin = thin_plate_part(scene)
@@ -66,7 +70,7 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
         "kind": "modal", "error": hypot(ERROR, thin.error), "lowest_height_mm": 1e3 * LOWEST,
         "warnings": [thin.warning(TOLERANCE)] if thin.error > TOLERANCE else [],
         "step": STEP, "side": SIDE,
-        "squared": pack(squared), "diagonal": pack(bent.copy()),
+        "squared": pack(squared), "diagonal": pack(bent.copy()), "damping": pack(damping),
         "between": quantise(bending[:coupled, :coupled]) if stretched else None,
         "law": pack(relative.astype(np.complex128)), "law_step": LAW_STEP,
         "V": quantise((turn.T @ fields)[:, inside]),

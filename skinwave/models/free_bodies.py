@@ -171,7 +171,7 @@ def affine_operators(body: Body, build: Build) -> AffineOperators:
         drag=build.drag, support=build.support, coat=build.coat,
     )  # fmt: skip
     around = air(body, build, affine.free)
-    return affine if around is None else affine.with_fluid(around)
+    return affine if around is None else affine.with_air(around)
 
 
 def solids_of(reference: Reference, body: Body) -> Solids:

@@ -17,7 +17,7 @@ from simple_model.load.spectrum import load_lines
 from simple_model.quantities import STRAIN
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
-from skinwave.bodies.sheet import refuse_open_air
+from skinwave.bodies.sheet import refuse_unheld_air
 from skinwave.bodies.supports import FRAME
 from skinwave.models.laws import check_laws
 from skinwave.scene import keys as scene_keys
@@ -288,7 +288,7 @@ def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None
             "free materials need an isotropic sheet in a frame, because tension and other "
             f"mountings do not scale with its modulus; use a frame, {own}"
         )
-    refuse_open_air(scene.body)
+    refuse_unheld_air(scene.body)
     _check_reading(scene, keys)
     lines = np.unique(np.concatenate([load_lines(each).frequencies for each in scene.loads]))
     if not lines.any():

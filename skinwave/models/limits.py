@@ -12,7 +12,6 @@ from simple_model import MovingPressure
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies.analytic import is_laterally_infinite
 from skinwave.bodies.body import Body
-from skinwave.bodies.sheet import open_air
 from skinwave.models import Limit, Model, named, names
 from skinwave.scene.load import PRESSURE
 from skinwave.scene.scene import Scene
@@ -254,15 +253,25 @@ def isotropic_limits(body: Body) -> Iterator[Limit]:
 
 
 def vacuum_limits(body: Body) -> Iterator[Limit]:
-    """Yield the limit of models with sparse matrices, which exclude the added mass of air."""
+    """Yield the limits of models with sparse matrices, which exclude air and lossy edges."""
+    yield from _edge_limits(body)
     if body.air:
         yield _air_limit("does not include the air around a sheet")
 
 
-def frame_air_limits(body: Body) -> Iterator[Limit]:
-    """Yield the limit of elements, which include air only if there is no free edge."""
-    if how := open_air(body):
-        yield _air_limit(f"includes the air only around a sheet in a frame, not around one {how}")
+def held_air_limits(body: Body) -> Iterator[Limit]:
+    """Yield the limits of elements: no lossy edges, and air only around a sheet that is held."""
+    yield from _edge_limits(body)
+    if body.air and body.sides != "clamped":
+        yield _air_limit(f"includes air only around a held sheet, not with {body.sides} sides")
+
+
+def _edge_limits(body: Body) -> Iterator[Limit]:
+    if body.mounting.edge_loss:
+        yield Limit(
+            why="has edges without loss",
+            cure="set edge_loss = 0", change=of_part("mounting", edge_loss=0.0),
+        )  # fmt: skip
 
 
 def _air_limit(why: str) -> Limit:

@@ -24,7 +24,7 @@ from skinwave.bodies.parts import PHALANX, PLAIN
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import Limit, Model, meshed, register
 from skinwave.models.laws import has_own_law, relaxing, series_tolerance
-from skinwave.models.limits import frame_air_limits, of_body, vacuum_limits
+from skinwave.models.limits import held_air_limits, of_body, vacuum_limits
 from skinwave.models.options import SolveOptions, response_of, solver_name
 from skinwave.models.reduced import answer, prepare
 from skinwave.scene.load import SupportMotion
@@ -306,7 +306,7 @@ FEM = register(
         words="linear waves on 10-node tetrahedra by a reduced-order model",
         solve=_solve_reduced,
         default_size=default_size,
-        limits=partial(_limits, frame_air_limits, True),
+        limits=partial(_limits, held_air_limits, True),
         colour="#0072B2",
         sources=(REDUCTION, ARNOLDI, MACROELEMENTS),
         is_reduced=True,

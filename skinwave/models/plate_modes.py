@@ -75,13 +75,16 @@ DEGREE = 5  # of the splines that are differentiated
 def plate_of(body: Body) -> Plate:
     """Return the thin plate of a sheet as a record of `simple_model.plates.modes`."""
     held, Q = body.mounting, body.solid.plane_stress * body.depth**3 / 12
-    support = {edge: held.support if edge in held.edges else "free" for edge in EDGES}
+    support: dict[str, Any] = {
+        edge: held.support if edge in held.edges else "free" for edge in EDGES
+    }
     return Plate(
         size_x=body.width, size_y=body.height, mass_per_area=body.mass_per_area,
         d11=Q[0, 0], d22=Q[1, 1], d12=Q[0, 1], d66=Q[2, 2],
         tension_x=held.tension_x, tension_y=held.tension_y, **support,
         clips=held.clips, clip_radius=held.clip_radius if held.clips else 0.0,
-        air_density=AIR_DENSITY if body.air else 0.0,
+        air_density=AIR_DENSITY if body.air else 0.0, baffle=body.air == "baffle",
+        edge_loss=held.edge_loss,
     )  # fmt: skip
 
 

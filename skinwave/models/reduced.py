@@ -50,7 +50,7 @@ from skinwave.typing import Bools, Floats
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = "reduced 10"  # of a cached body
+FORMAT = "reduced 11"  # of a cached body
 NEGLIGIBLE_LINE_RATIO = 1e-7  # to the strongest line at the probes
 
 
@@ -244,7 +244,7 @@ def reduce_body(
         size = np.linalg.norm(loads) / np.linalg.norm(inertia)
         loads = np.column_stack([loads, size * inertia])
     model = fem.reduce(
-        operators, outputs, BAND, tolerance, loads=loads, added=air(body, build, operators.free),
+        operators, outputs, BAND, tolerance, loads=loads, air=air(body, build, operators.free),
         solver=solver, progress=partial(report, "reduce"),
     )  # fmt: skip
     P = P.tocsr()

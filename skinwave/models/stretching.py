@@ -223,7 +223,7 @@ def _reduce(body: Body, h: float, solver: str) -> _Reduced:
     operators = stretching_body(body, made).operators
     modes = stretching_modes(
         made.mesh, operators, membrane(body, made, 1.0), mode_count(body),
-        added=air(body, made, operators.free), solver=solver,
+        air=air(body, made, operators.free), solver=solver,
     )  # fmt: skip
     P, points = surface_load(made)
     modal = modes.elastic.operators
@@ -313,7 +313,7 @@ REDUCED = register(
         method="large deflection, step by step from rest",
         words="a sheet that stretches as it bends, in its modes, from rest",
         solve=reduced_answer,
-        limits=partial(_limits, limits.frame_air_limits, REDUCED_SIZE),
+        limits=partial(_limits, limits.held_air_limits, REDUCED_SIZE),
         parts=_parts,
         default_size=REDUCED_SIZE,
         sources=(NEWMARK, NEWTON),

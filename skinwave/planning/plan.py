@@ -222,11 +222,8 @@ def _steady_start(scene: Scene, tolerance: float, grid: Grid) -> float | None:
 
 def why_modes(scene: Scene, tolerance: float) -> str:
     """Return the reason to use plate modes instead of elements; "" if elements are better."""
-    body = scene.body
     if not takes(FROM_REST, scene) or not _suffices(FROM_REST, scene, tolerance):
         return ""
-    if body.air and not body.mounting.is_frame:
-        return f"elements include air only around a sheet in a frame, not one {body.mounting.words}"
     return "a flat sheet with clamped sides, whose modes need no mesh"
 
 

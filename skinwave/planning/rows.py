@@ -128,7 +128,7 @@ def neglected_rows(scene: Scene, highest: float) -> list[PlanRow]:
             value=f"added mass {significant(air, 2)} times the mass of the sheet",
             reason=f"{lower}; the model uses the added mass of each wavenumber"
             if body.air
-            else f"{lower} in air; set air = true in [body] to include it",
+            else f'{lower} in air; set air = "free" in [body] to include it',
         ),
         PlanRow(
             what="left out: stretching",

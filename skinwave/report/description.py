@@ -79,8 +79,12 @@ def _sheet_text(runs: list[Run]) -> str:
         )
     if body.air:
         sentences.append(
-            "Air moves with the sheet on both sides. Left out: flow around the edge, and sound "
-            "radiation."
+            "Air on both sides moves with the sheet, and takes energy by friction and sound; "
+            + (
+                "it flows around the edges."
+                if body.air == "free"
+                else "a wall around the sheet separates both sides."
+            )
         )
     else:
         sentences.append(

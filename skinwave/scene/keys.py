@@ -76,6 +76,11 @@ def _switch(key: str, value: Any) -> bool:
     return bool(_of_type(key, value, bool, "true or false"))
 
 
+def _air(key: str, value: Any) -> bool | str:
+    must = 'false, "free" or "baffle"'
+    return value if isinstance(value, str) else bool(_of_type(key, value, bool, must))
+
+
 def _numbers(key: str, value: Any) -> tuple[float, ...]:
     return tuple(_number(key, x) for x in _of_type(key, value, list, "a list of numbers"))
 
@@ -312,7 +317,7 @@ MOUNTING = {
     "clips_mm": SceneKey("clips", _points, _write_points),
     **_numbers_of(
         clip_radius_mm="clip_radius", tension_x_n_per_m="tension_x", tension_y_n_per_m="tension_y",
-        curl_x_mm="curl_x", curl_y_mm="curl_y",
+        curl_x_mm="curl_x", curl_y_mm="curl_y", edge_loss="edge_loss",
     ),
 }  # fmt: skip
 BONE, RELIEF = (
@@ -370,7 +375,7 @@ SECTIONS = {
         "regions": SceneKey(
             "regions", _regions, lambda named: {name: write_material(each) for name, each in named}
         ),
-        "air": SceneKey("air", _switch, bool),
+        "air": SceneKey("air", _air, lambda air: air),
         "mounting": _record("body", "mounting", _mounting, MOUNTING),
         **_numbers_of(grammage_g_m2="grammage"),
     },

@@ -62,11 +62,12 @@ export class ModalBody {
 
   /** Diagonal {re, im} (m,) of the dynamic stiffness at a frequency in Hz, and `factor`, which is c. */
   stiffness(frequency) {
-    const omega2 = (2 * Math.PI * frequency) ** 2, { modes } = this;
+    const omega = 2 * Math.PI * frequency, omega2 = omega ** 2, { modes } = this;
     const factor = lawAt(this.law_step, this.law, frequency);
     const re = Float64Array.from({ length: modes },
       (_, m) => this.squared[m] - omega2 + factor[0] * this.diagonal[m]);
-    return { re, im: Float64Array.from(this.diagonal, (own) => factor[1] * own), factor };
+    const im = Float64Array.from(this.diagonal, (own, m) => factor[1] * own + omega * this.damping[m]);
+    return { re, im, factor };
   }
 
   /**

@@ -41,7 +41,8 @@ ASSUMPTIONS = {
     "laterally-infinite": "the body has its own shape, size and supports",
     "one material": "the body has layers",
     "alike in all directions": "stiffness and tension of the sheet differ by direction",
-    "vacuum": "the air moves with the sheet",
+    "vacuum": "the air moves with the sheet and damps it",
+    "baffle": "the air flows around the edges of the sheet",
     "main lobe only": "the focus has the side lobes of the array",
     "continuous path": "the focus jumps at the device's rate",
     "rigid base": "the body rests on springs",
@@ -80,7 +81,8 @@ def droppable(scene: Scene) -> tuple[str, ...]:
         "one material": bool(body.layers)
         or (slab and sum(x.thickness for x in LAYERS) < body.depth < np.inf),
         "alike in all directions": sheet and isotropic_sheet(body) != body,
-        "vacuum": sheet and (body.air or body.mounting.is_frame),
+        "vacuum": sheet and bool(body.air or body.mounting.is_frame),
+        "baffle": sheet and body.air == "free" and body.mounting.is_frame,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
         "rigid base": body.base == "elastic",
@@ -224,7 +226,8 @@ def _body(scene: Scene, dropped: Collection[str], h: float | None) -> Body:
     changes: dict[str, object] = {"material": assumed(body.material), "layers": layers}
     changes["regions"] = tuple((name, assumed(material)) for name, material in body.regions)
     if body.of_kind.is_plate:
-        changes["air"] = "vacuum" in dropped
+        open_air = "baffle" in dropped or not body.mounting.is_frame
+        changes["air"] = "vacuum" in dropped and ("free" if open_air else "baffle")
     if "flat" in dropped:
         width = min(body.width, BODIES["palm"].width)
         merged = (merged_layer(layers),) if layers else ()

@@ -9,7 +9,7 @@ from scipy import sparse
 
 import fem
 import meshes
-from fem.added_mass import near_field
+from fem.air import near_field
 from meshes import TetMesh
 from simple_model.layers.compliance import AIR_DENSITY, thin_sheet
 from simple_model.layers.wavenumber_integral import point_response
@@ -197,7 +197,7 @@ def focus_in_air() -> Checks:
     force = push(mesh, gaussian())[:, None]
     model = fem.reduce(
         ops, sparse.csr_array(force.T), hz.max(), 2e-3,
-        added=fem.added_mass(mesh, ops.free, AIR_DENSITY, mirrored="xy"),
+        air=fem.air_around(mesh, ops.free, AIR_DENSITY, mirrored="xy"),
     )  # fmt: skip
     model = replace(model, outputs=S @ model.basis)
     amplitudes = fem.transfer(model, model.basis.T @ force, hz)[..., 0]

@@ -41,8 +41,12 @@ def half_space_kernel(k: Array, w: float, *, density: float, mu: complex, poisso
 
 
 def plate_kernel(k: Array, w: float, *, stiffness: complex, mass: float, air: float) -> Array:
-    """Return 1 / [D k^4 - (m + 2 air / k) w^2]."""
-    return 1 / (stiffness * k**4 - (mass + 2 * air / k) * w**2)
+    """Return 1 / [D k^4 - (m + 2 air / sqrt(k^2 - k0^2)) w^2 + i w R] with k0 = w / 343 m/s and the
+    resistance R = 2 sqrt(i w eta air) of viscous air.
+    """
+    fluid = 2 * air / np.sqrt(k**2 - (w / 343.0) ** 2 + 0j)
+    resistance = 2 * np.sqrt(1j * w * 1.82e-5 * air)
+    return 1 / (stiffness * k**4 - (mass + fluid) * w**2 + 1j * w * resistance)
 
 
 def gaussian_response(

@@ -10,14 +10,16 @@ import fem
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.layers.compliance import thin_sheet
 from simple_model.layers.wavenumber_integral import point_response
+from simple_model.plates.free_modes import free_modes
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
 from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
+from skinwave.models.plate_modes import modes_of, plate_of
 from skinwave.models.reduced import answer, prepare, typical_spots
 from skinwave.models.stretching import reduced_answer
 from skinwave.planning.simulate import compute
-from skinwave.scene.scene import BODIES, Placement, Scene
+from skinwave.scene.scene import BODIES, Mounting, Placement, Scene
 from skinwave.verify import references
 from skinwave.verify.setups import PAPER
 
@@ -34,17 +36,18 @@ def test_models_without_modes_refuse_air(model):
         compute(SCENE, model, h=H)
 
 
-def test_added_mass_is_symmetric_positive_and_independent_of_position():
-    tilted = replace(SHEET, placement=Placement(tilt_x=0.5, tilt_y=-0.3, lift=0.01))
+@pytest.mark.parametrize("around", ["free", "baffle"])
+def test_added_mass_is_symmetric_positive_and_independent_of_position(around):
+    tilted = replace(SHEET, air=around, placement=Placement(tilt_x=0.5, tilt_y=-0.3, lift=0.01))
     turned = build(tilted, H)
     made = replace(build(SHEET, H), held=turned.held)
     ops = operators(made)
-    M = air(SHEET, made, ops.free)
+    M = air(replace(SHEET, air=around), made, ops.free).mass
     rng = np.random.default_rng(3)
     x, y = rng.standard_normal((2, len(ops.free)))
     assert x @ (M @ y) == pytest.approx(y @ (M @ x), rel=1e-9)
     assert x @ (M @ x) > 0
-    A = air(tilted, turned, operators(turned).free)
+    A = air(tilted, turned, operators(turned).free).mass
 
     def placed(u):
         full = ops.expand(u).reshape(-1, 3) @ tilted.placement.rotation.T
@@ -59,7 +62,7 @@ def test_static_moments_suffice_within_their_error_estimate():
     P, points = surface_load(made)
     loads_ = P @ typical_spots(SHEET, points)
     S = fem.probe_operator(made.mesh, SCENE.probe_points)
-    reduced = partial(fem.reduce, ops, S, 1000.0, loads=loads_, added=air(SHEET, made, ops.free))
+    reduced = partial(fem.reduce, ops, S, 1000.0, loads=loads_, air=air(SHEET, made, ops.free))
     few, many = reduced(1e-3), reduced(1e-6)
     assert few.basis.shape[1] < many.basis.shape[1]
     hz = np.linspace(5, 1000, 100)
@@ -68,18 +71,36 @@ def test_static_moments_suffice_within_their_error_estimate():
     assert error.max() < 1e-3
     assert few.estimate / 4 < error.max() < few.estimate * 4
     basis = few.basis[ops.free]
-    mass = basis.T @ (ops.M @ basis + air(SHEET, made, ops.free) @ basis)
+    mass = basis.T @ (ops.M @ basis + air(SHEET, made, ops.free).mass @ basis)
     np.testing.assert_allclose(mass, np.eye(len(mass)), atol=1e-9)
 
 
-def test_a_quarter_in_air_moves_like_the_whole():
+@pytest.mark.parametrize("around", ["free", "baffle"])
+def test_a_quarter_in_air_moves_like_the_whole(around):
     still = replace(LOAD, tacton=replace(LOAD.tacton, trajectory=Trajectory()))
-    scene = replace(SCENE, pressure=still)
+    scene = replace(SCENE, pressure=still, body=replace(SHEET, air=around))
     whole, part = (
         answer(prepare(scene, SolveOptions(h=H), symmetry=axes), scene).displacement
         for axes in ("", "xy")
     )
     assert np.linalg.norm(part - whole) < 2e-3 * np.linalg.norm(whole)
+
+
+@pytest.mark.parametrize("around", ["free", "baffle"])
+def test_elements_and_modes_ring_alike_in_air(around):
+    """Lowest natural frequencies and decays of a stretched sheet, of modes that probes can read."""
+    held = Mounting(tension_x=30.0, tension_y=10.0)
+    sheet = replace(BODIES["a6-sheet"], width=0.06, height=0.05, air=around, mounting=held)
+    reduced = prepare(replace(SCENE, body=sheet), SolveOptions(h=1.25e-3))
+    found = reduced.poles.values
+    found = found[found.imag > 1.0]
+    found = found[np.argsort(found.imag)][:3]
+    free = free_modes(modes_of(plate_of(sheet)), sheet.solid)
+    exact = free.poles[free.residues.imag != 0]
+    exact = exact[exact.imag > 1.0]
+    exact = exact[np.argsort(exact.imag)][:3]
+    np.testing.assert_allclose(found.imag, exact.imag, rtol=5e-3)
+    np.testing.assert_allclose(found.real, exact.real, rtol=0.03)
 
 
 @pytest.mark.slow
