@@ -193,7 +193,7 @@ def weights(terms: Terms, solids: Solids, frequencies: ArrayLike) -> Complex:
                 return np.full_like(s, solids.springs)
             case "fluid":
                 return s**2
-        return s * growth(kind, s.imag)
+        return s * growth(kind, np.asarray(s.imag, np.float64))
 
     return np.stack([of_kind(kind, solids.materials[r]) for kind, r in terms], axis=-1)
 

@@ -13,6 +13,9 @@ from fem.air import near_field
 from meshes import TetMesh
 from simple_model.layers.compliance import AIR_DENSITY, thin_sheet
 from simple_model.layers.wavenumber_integral import point_response
+from simple_model.load.focus import SPEED_OF_SOUND
+from simple_model.plates.air import AirLoss, air_of
+from simple_model.plates.polynomials import line_basis
 from skinwave.typing import Floats
 from skinwave.verify import references
 from skinwave.verify.case import Checks, below, case, misfit, order, relative
@@ -173,6 +176,34 @@ def air_operator() -> Checks:
     yield order("order in the spacing, Gaussian", sizes, errors, 2, 0.1)
     yield relative("Gaussian, 32 nodes per standard deviation", 1 - errors[-1], 1.0, 5e-5)
     yield relative("Lamb's factor of the added mass, one side", factor, LAMBS_FACTOR, 1e-3)
+
+
+@case(
+    "mass: DNV-RP-H103 (2011), table A-2; sound: Wallace, J Acoust Soc Am 51:946 (1972), eq. 3, at "
+    "k0 = 1/m",
+)
+def sheet_sound() -> Checks:
+    """Rectangle in open air and simply supported plate in a baffle, by Ritz's method."""
+    for ratio, coefficient in ((1, 0.579), (2, 0.757), (4, 0.872)):
+        x, y = (line_basis(side, ("free", "free"), 12, True)[0] for side in (0.1 * ratio, 0.1))
+        mass = air_of(x, y, 1.0, baffle=False)[0][0, 0] * 0.01 * ratio
+        cylinder = np.pi / 4 * 0.1**3 * ratio
+        yield relative(f"mass of {ratio} by 1, open air", mass / cylinder, coefficient, 2e-3)
+    sides = 0.15, 0.1
+    (x, _), (y, _) = (line_basis(side, ("simply", "simply"), 24, True) for side in sides)
+    _, patterns, orders = air_of(x, y, AIR_DENSITY, baffle=True)
+    of_x, of_y = (np.linalg.eigh(line.slope)[1] for line in (x, y))  # sines of unit norm
+    a, b = sides
+    for m, n in ((1, 1), (3, 1), (1, 3)):
+        wave = np.kron(of_x[:, m // 2], of_y[:, n // 2])
+        loss = AirLoss(
+            patterns=patterns @ wave[:, None], orders=orders, areas=np.zeros(1),
+            density=AIR_DENSITY,
+        )  # fmt: skip
+        found = loss.of_each(np.array([SPEED_OF_SOUND]))[0, 0] / 2 / AIR_DENSITY / SPEED_OF_SOUND
+        first = [(1 - 8 / (k * np.pi) ** 2) * q for k, q in ((m, a / b), (n, b / a))]
+        exact = 32 * a * b / (m**2 * n**2 * np.pi**5) * (1 - a * b / 12 * sum(first))
+        yield relative(f"radiation efficiency of mode {m}, {n}", found, exact, 1e-3)
 
 
 @case(

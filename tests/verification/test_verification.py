@@ -19,8 +19,8 @@ from skinwave.verify.stepping import oscillator
 GATE = (
     "patch", "patch-quadratic", "slivers", "manufactured",
     "stiffness-contrast", "fingertip-with-bone", "thin-sheets", "in-plane-shear", "moving-force",
-    "air-operator", "rayleigh", "oblique-p-sv", "exact-half-space", "exact-slab", "exact-sheet",
-    "order-in-time", "columns", "narrow-focus", "degenerate-paths", "durations",
+    "air-operator", "sheet-sound", "rayleigh", "oblique-p-sv", "exact-half-space", "exact-slab",
+    "exact-sheet", "order-in-time", "columns", "narrow-focus", "degenerate-paths", "durations",
     "elastica", "tangent",
 )  # fmt: skip
 
