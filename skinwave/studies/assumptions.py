@@ -82,7 +82,7 @@ def droppable(scene: Scene) -> tuple[str, ...]:
         or (slab and sum(x.thickness for x in LAYERS) < body.depth < np.inf),
         "alike in all directions": sheet and isotropic_sheet(body) != body,
         "vacuum": sheet and bool(body.air or body.mounting.is_frame),
-        "baffle": sheet and body.air == "free" and body.mounting.is_frame,
+        "baffle": sheet and body.air != "baffle" and body.mounting.is_frame,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
         "rigid base": body.base == "elastic",

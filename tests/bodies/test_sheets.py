@@ -223,10 +223,15 @@ def test_models_refuse_sheets_that_they_do_not_cover():
     assert not refused("flat-body", replace(two, mounting=replace(TWO, tension_y=30.0)))
     for model in ("flat-body", "plate-modes", "fem-nonlinear"):
         assert len(refused(model, replace(two, mounting=Mounting(curl_y=1e-3)))) == 1
-    for model in ("fem", "fem-transient"):
-        (limit,) = refused(model, replace(two, air=True))
-        assert limit.cure == "set air = false"
-    assert not refused("plate-modes", replace(two, air=True))
+    (limit,) = refused("fem-transient", replace(two, air="free"))
+    assert limit.cure == "set air = false"
+    assert not refused("plate-modes", replace(two, air="free"))
+    assert not refused("fem", replace(two, air="free"))
+    with pytest.raises(ValueError, match="hold all edges, or use air = \"free\""):
+        replace(two, air="baffle")
+    lossy = replace(two, mounting=replace(TWO, edge_loss=0.01))
+    assert [limit.cure for limit in refused("fem", lossy)] == ["set edge_loss = 0"]
+    assert not refused("plate-modes", lossy)
     assert len(refused("plate-modes", replace(SMALL, sides="absorbing"))) == 1
     scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=two)
     required = plan(scene, SolveOptions(model="plate-modes"))

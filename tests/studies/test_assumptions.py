@@ -36,7 +36,7 @@ def test_assumptions_of_slab_and_sheet():
     assert assumptions.side_step(PAPER) == ()
     assert droppable(PAPER) == (
         "linear drive", "sinc^2 profile", "no propagation", "little loss", "laterally-infinite",
-        "vacuum", "main lobe only", "continuous path", "small deflection",
+        "vacuum", "baffle", "main lobe only", "continuous path", "small deflection",
     )  # fmt: skip
     with pytest.raises(ValueError, match="assumption"):
         droppable(replace(SKIN, body=BODIES["none"]))
@@ -99,7 +99,7 @@ def test_first_and_last_models_of_the_hierarchy():
     assert len(scene.body.layers) == 1
     sheet, model = without(PAPER, droppable(PAPER))
     assert model == "plate-modes-nonlinear"
-    assert sheet.body == replace(PAPER.body, air=True)
+    assert sheet.body == replace(PAPER.body, air="free")
 
 
 def test_a_device_rests_on_equally_spaced_points():
