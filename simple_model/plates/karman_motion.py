@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg.blas import dsyrk
@@ -36,7 +36,7 @@ from scipy.linalg.lapack import dposv
 from simple_model.layers.material import Material
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.spectrum import lines_from_rest, synthesise
-from simple_model.plates.free_modes import WITHOUT_LOSS, FreeModes, Loss, free_modes
+from simple_model.plates.free_modes import WITHOUT_LOSS, Loss, free_modes
 from simple_model.plates.modes import PlateModes, modal_motion, modal_motion_apart
 from simple_model.plates.path_forces import MIDDLE, modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
@@ -61,47 +61,53 @@ def linear_motion(
 
     The material has the `shear_modulus` of the modes and no modulus law of its own; times (t,) in s
     are 0 or above; `middle` (2,) in m is that of the plate in the scene. Returns the modes of
-    indices `chosen` (r,), by default all. Lines of the load are computed below `driving` Hz, and
-    those at or above `highest` Hz are left out.
+    indices `chosen` (r,), by default all. Lines of the load are computed below `driving` Hz; the
+    steady vibration of those at or above `highest` Hz is left out.
     """
     x, y = middle
-    f, forces, motion = driven_lines(modes, pressure, material, (x, y), driving)
-    few = f < highest
-    f, forces, motion = f[few], forces[few], motion[few]
-    chosen = np.arange(len(modes.squared)) if chosen is None else chosen
-    coupling = motion - modal_motion_apart(modes, f, forces, partial(_relative_modulus, material))
-    forces, motion, coupling = (each[:, chosen] for each in (forces, motion, coupling))
-    whole = _free_modes(modes, material)
-    free = FreeModes(poles=whole.poles[chosen], residues=whole.residues[chosen])
-    start = free.start(f, forces)
-    start -= free.impulse(coupling.real.sum(axis=0), (2j * np.pi * f @ coupling).real)
-    coordinates = synthesise(f, motion, times)
-    for poles, amplitudes in zip(free.poles.T, start.T, strict=True):
+    driven = modes_from_rest(modes, pressure, material, (x, y), driving)
+    chosen, few = slice(None) if chosen is None else chosen, driven.frequencies < highest
+    coordinates = synthesise(driven.frequencies[few], driven.motion[few][:, chosen], times)
+    for poles, amplitudes in zip(driven.poles[chosen].T, driven.start[chosen].T, strict=True):
         moving = amplitudes != 0
         decay = np.exp(np.multiply.outer(times, poles[moving]))
         coordinates[:, moving] += (decay * amplitudes[moving]).real
     return coordinates
 
 
-_free_modes = lru_cache(maxsize=4)(free_modes)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModesFromRest:
+    """Motion of modes from rest without stretching: the steady vibration `motion` (f, m) in kg^1/2
+    m under modal `forces` (f, m) in N kg^-1/2 at `frequencies` (f,) in Hz, and the free vibration
+    after its `start`, amplitudes (m, j) of exp(t `poles` (m, j)).
+    """
+
+    frequencies: Floats
+    forces: Complex
+    motion: Complex
+    poles: Complex
+    start: Complex
 
 
-def _relative_modulus(material: Material, omega: Floats) -> Complex:
-    return np.asarray(material.complex_modulus(omega) / material.shear_modulus)
-
-
-@lru_cache(maxsize=4)
-def driven_lines(
+@lru_cache(maxsize=2)
+def modes_from_rest(
     modes: PlateModes, pressure: MovingPressure, material: Material, middle: tuple[float, float],
     highest: float = np.inf,
-) -> tuple[Floats, Complex, Complex]:  # fmt: skip
-    """Return frequencies (f,) in Hz, modal forces (f, m) in N kg^-1/2, and steady coordinates
-    (f, m) in kg^1/2 m of the `lines_from_rest` below `highest`; kept, because several runs need
-    them.
+) -> ModesFromRest:  # fmt: skip
+    """Return the motion from rest under the lines of a load below `highest` Hz; kept, because
+    several runs need it.
     """
+
+    def modulus(omega: Floats) -> Floats:
+        return np.asarray(material.complex_modulus(omega) / material.shear_modulus)
+
     f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
     f, forces = f[f < highest], forces[f < highest]
-    return f, forces, modal_motion(modes, f, forces, partial(_relative_modulus, material))
+    motion, free = modal_motion(modes, f, forces, modulus), free_modes(modes, material)
+    coupling = motion - modal_motion_apart(modes, f, forces, modulus)
+    start = free.start(f, forces)
+    start -= free.impulse(coupling.real.sum(axis=0), (2j * np.pi * f @ coupling).real)
+    return ModesFromRest(frequencies=f, forces=forces, motion=motion, poles=free.poles, start=start)
 
 
 def stretched_motion(

@@ -27,7 +27,7 @@ from simple_model.layers.compliance import AIR_DENSITY, thick_plate
 from simple_model.load.sampling import below_half_the_rate, highest_driving, step
 from simple_model.load.spectrum import synthesise
 from simple_model.plates.free_modes import free_modes
-from simple_model.plates.karman_motion import driven_lines, linear_motion, stretched_motion
+from simple_model.plates.karman_motion import linear_motion, modes_from_rest, stretched_motion
 from simple_model.plates.modes import (
     Plate,
     PlateModes,
@@ -63,6 +63,7 @@ KARMAN = (
 LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
 COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number compared with the one before
 FIRST_DURATION = 0.2  # s of a response, at least, that decides whether a sheet stretches
+NEGLIGIBLE_LINE = 1e-4  # of the strongest: weaker lines do not change the sensitivity
 NEGLIGIBLE_MODE = 1e-4  # of the mode that moves most: weaker modes do not show on a map
 SHARE = 0.6  # of the tolerance, for the error of steps and modes
 # Error over the change by fewer modes: 0.2 to 1.7, because modes converge slowly near a resonance.
@@ -91,7 +92,7 @@ _karman = lru_cache(maxsize=6)(karman_plate)
 
 def middle_compliance(body: Body) -> float:
     """Return the static deflection at the middle of a supported sheet per force there, in m/N."""
-    modes = modes_of(plate_of(replace(body, air=False)))
+    modes = modes_of(plate_of(body))
     at_rest = relative_modulus(body, 0.0).real
     stiffness = modes.squared * (1 + (at_rest - 1) * modes.elastic)
     return float((modes.at([[0.0, 0.0]]) ** 2 / stiffness).sum())
@@ -107,13 +108,16 @@ class Driven:
     """Modes of a scene's plate under its load; `outputs` (p, m) are their shapes at the probes.
 
     The load has lines at `frequencies` (f,) in Hz with modal `forces` (f, m) in N kg^-1/2, and
-    `motion` (f, m) in the steady state.
+    `motion` (f, m) in the steady state. From rest, they add exp(t `poles` (m, j)) with the
+    amplitudes `start` (m, j).
     """
 
     modes: PlateModes
     frequencies: Floats
     forces: Complex
     motion: Complex
+    poles: Complex
+    start: Complex
     outputs: Floats
 
 
@@ -177,14 +181,12 @@ def effect_of(change: Callable[[Body, PlateModes], Factors], scene: Scene, sampl
 
     `change` returns the factors (m,) of a body's modes.
     """
-    times, modulus = sample_times(scene)[:samples], partial(relative_modulus, scene.body)
-    driven, values = _uncoupled(scene, samples)
+    times, (driven, values) = sample_times(scene)[:samples], _uncoupled(scene, samples)
     count = len(driven.modes.squared)
     bending, mass = (np.broadcast_to(f, count) for f in change(scene.body, driven.modes))
     modes = scaled_modes(driven.modes, bending=bending, mass=mass)
     forces, outputs = (each / np.sqrt(mass) for each in (driven.forces, driven.outputs))
-    motion = modal_motion_apart(modes, driven.frequencies, forces, modulus)
-    other = replace(driven, modes=modes, forces=forces, outputs=outputs, motion=motion)
+    other = _apart(replace(driven, modes=modes, forces=forces, outputs=outputs), scene.body)
     changed = _from_rest(scene, other, times)
     return float(relative_changes(changed - values, changed).max())
 
@@ -201,14 +203,23 @@ def _detuned(body: Body, modes: PlateModes) -> Factors:
 
 @lru_cache(maxsize=2)
 def _uncoupled(scene: Scene, samples: int) -> tuple[Driven, Floats]:
-    """Return the motion from rest (t, p) without coupling between modes, and its modes."""
+    """Return the motion from rest (t, p) without coupling between modes, and its modes, under the
+    lines that matter.
+    """
     times = sample_times(scene)[:samples]
     driven = _drive(scene, times)
-    motion = modal_motion_apart(
-        driven.modes, driven.frequencies, driven.forces, partial(relative_modulus, scene.body)
-    )
-    driven = replace(driven, motion=motion)
+    sizes = np.linalg.norm(driven.motion, axis=1)
+    strong = sizes > NEGLIGIBLE_LINE * sizes.max(initial=0.0)
+    driven = replace(driven, frequencies=driven.frequencies[strong], forces=driven.forces[strong])
+    driven = _apart(driven, scene.body)
     return driven, _from_rest(scene, driven, times)
+
+
+def _apart(driven: Driven, body: Body) -> Driven:
+    """Return the motion under the same forces without coupling between modes."""
+    f, forces, free = driven.frequencies, driven.forces, free_modes(driven.modes, body.solid)
+    motion = modal_motion_apart(driven.modes, f, forces, partial(relative_modulus, body))
+    return replace(driven, motion=motion, poles=free.poles, start=free.start(f, forces))
 
 
 def _drive(scene: Scene, times: Floats, progress: Progress = silent) -> Driven:
@@ -217,13 +228,8 @@ def _drive(scene: Scene, times: Floats, progress: Progress = silent) -> Driven:
     modes: PlateModes = modes_of(plate_of(body))
     progress("lines", 0.0)
     x, y = body.placement.offset
-    f, forces, motion = driven_lines(
-        modes, pressure, body.solid, (x, y), highest_driving(pressure, times)
-    )
-    return Driven(
-        modes=modes, frequencies=f, forces=forces, motion=motion,
-        outputs=modes.at(scene.probe_points - (x, y)),
-    )  # fmt: skip
+    driven = modes_from_rest(modes, pressure, body.solid, (x, y), highest_driving(pressure, times))
+    return Driven(modes=modes, outputs=modes.at(scene.probe_points - (x, y)), **vars(driven))
 
 
 def _response(
@@ -254,20 +260,12 @@ def _amplitudes(scene: Scene, driven: Driven) -> Complex:
 
 
 def _free_vibration(scene: Scene, driven: Driven, times: Floats) -> Floats:
-    """Return the free vibration (t, p) after the state of rest before t = 0. Uncoupled modes are
-    solved separately; coupled ones such that all are at rest at t = 0.
-    """
-    modes, f, forces = driven.modes, driven.frequencies, driven.forces
-    free = free_modes(modes, scene.body.solid)
-    uncoupled = modal_motion_apart(modes, f, forces, partial(relative_modulus, scene.body))
-    coupling = driven.motion - uncoupled
-    speed = (2j * np.pi * f @ coupling).real
-    start = free.start(f, forces) - free.impulse(coupling.real.sum(axis=0), speed)
-    start *= scene.reading.record.factor(free.poles)
-    vibrates = free.residues != 0
+    """Return the free vibration (t, p) after the state of rest before t = 0."""
+    vibrates = driven.start != 0
+    rates = driven.poles[vibrates]
     outputs = np.broadcast_to(driven.outputs.T[:, None], (*vibrates.shape, len(driven.outputs)))
-    amplitudes = start[vibrates][:, None] * outputs[vibrates]
-    return exponential_sum(free.poles[vibrates], amplitudes, times)
+    amplitudes = driven.start[vibrates] * scene.reading.record.factor(rates)
+    return exponential_sum(rates, amplitudes[:, None] * outputs[vibrates], times)
 
 
 def limits(scene: Scene) -> Iterator[Limit]:
