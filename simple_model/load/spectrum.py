@@ -37,6 +37,7 @@ PHASES = 8  # of each sinusoid, at least
 MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all
 ALIASED = 1e-4  # of the strongest: largest harmonic of a drive law beyond those sampled
 MANY_LINES, RAISED_POWER = 20, 8  # lines of a jump; power of frequency that raises the last
+EQUAL_STEPS = 1e-9  # relative difference of steps between equally spaced times
 LINES_AT_ONCE = 2**24  # times points, some hundred megabytes
 
 
@@ -184,8 +185,18 @@ def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Float
     array([[ 1.],
            [-1.]])
     """
-    turn = np.exp(2j * np.pi * np.outer(times, frequencies))
-    return np.asarray(turn.real @ amplitudes.real - turn.imag @ amplitudes.imag)
+    apart = np.diff(times)
+    equal = len(times) > 1 and np.ptp(apart) <= EQUAL_STEPS * abs(apart[0])
+    block = int(np.ceil(np.sqrt(len(times)))) if equal else max(1, len(times))
+    # Exponentials are products of those within the first block of times and at the start of each.
+    within = np.exp(2j * np.pi * np.outer(times[:block] - times[:1], frequencies))
+    values = np.empty((len(times), *amplitudes.shape[1:]))
+    for first in range(0, len(times), block):
+        part = values[first : first + block]
+        turned = amplitudes * np.exp(2j * np.pi * frequencies * times[first])[:, None]
+        turn = within[: len(part)]
+        part[:] = turn.real @ turned.real - turn.imag @ turned.imag
+    return values
 
 
 def merge_lines(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:

@@ -18,9 +18,9 @@ is constant to round-off. It is never negative, so the motion is bounded for any
 solves one positive definite linear system (Bilbao, Numer Methods Partial Differ Equ 24:193 (2008);
 Bilbao, Thomas, Touze and Ducceschi, ibid. 31:1948 (2015), doi 10.1002/num.21974).
 
-M is a little above 1, so that a mode without stretching has its exact frequency. The forces of
-`stretched_motion` are those under which the steps of the linear plate are an exact linear motion,
-so the error of the steps is in proportion to the effect of stretching.
+M is a little above 1, so that a mode without stretching has its exact frequency. The steps of
+`stretched_motion` take the difference from the exact linear motion, so their error is in proportion
+to the effect of stretching.
 """
 
 from __future__ import annotations
@@ -30,26 +30,19 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.linalg.blas import dsyrk
 from scipy.linalg.lapack import dposv
 
 from simple_model.layers.material import Material
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.spectrum import lines_from_rest, synthesise
-from simple_model.plates.free_modes import WITHOUT_LOSS, FreeModes, Loss, free_modes
+from simple_model.plates.free_modes import WITHOUT_LOSS, Loss, free_modes
 from simple_model.plates.modes import PlateModes, modal_motion, modal_motion_apart
 from simple_model.plates.path_forces import MIDDLE, modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
 from simple_model.typing import Complex, Floats, Ints
 
 HIGHEST_PHASE = 1.2  # rad per half step; faster modes are slowed down to it
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
-    """Modal coordinates (n, r) in kg^1/2 m at steps, and `energy` (n - 1,) in J between them."""
-
-    coordinates: Floats
-    energy: Floats
 
 
 def linear_motion(
@@ -60,6 +53,7 @@ def linear_motion(
     *,
     middle: Sequence[float] = MIDDLE,
     chosen: Ints | None = None,
+    driving: float = np.inf,
     highest: float = np.inf,
 ) -> Floats:
     """Modal coordinates (t, r) in kg^1/2 m from rest of a plate that does not stretch, without time
@@ -67,26 +61,41 @@ def linear_motion(
 
     The material has the `shear_modulus` of the modes and no modulus law of its own; times (t,) in s
     are 0 or above; `middle` (2,) in m is that of the plate in the scene. Returns the modes of
-    indices `chosen` (r,), by default all. Lines of the load at or above `highest` Hz are left out.
+    indices `chosen` (r,), by default all. Lines of the load are computed below `driving` Hz; the
+    steady vibration of those at or above `highest` Hz is left out.
     """
     x, y = middle
-    f, motion, free, start = _linear_parts(modes, pressure, material, (x, y), highest)
-    chosen = np.arange(len(modes.squared)) if chosen is None else chosen
-    coordinates = synthesise(f, motion[:, chosen], times)
-    for poles, amplitudes in zip(free.poles[chosen].T, start[chosen].T, strict=True):
+    driven = modes_from_rest(modes, pressure, material, (x, y), driving)
+    chosen, few = slice(None) if chosen is None else chosen, driven.frequencies < highest
+    coordinates = synthesise(driven.frequencies[few], driven.motion[few][:, chosen], times)
+    for poles, amplitudes in zip(driven.poles[chosen].T, driven.start[chosen].T, strict=True):
         moving = amplitudes != 0
         decay = np.exp(np.multiply.outer(times, poles[moving]))
         coordinates[:, moving] += (decay * amplitudes[moving]).real
     return coordinates
 
 
-@lru_cache(maxsize=4)
-def _linear_parts(
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModesFromRest:
+    """Motion of modes from rest without stretching: the steady vibration `motion` (f, m) in kg^1/2
+    m under modal `forces` (f, m) in N kg^-1/2 at `frequencies` (f,) in Hz, and the free vibration
+    after its `start`, amplitudes (m, j) of exp(t `poles` (m, j)).
+    """
+
+    frequencies: Floats
+    forces: Complex
+    motion: Complex
+    poles: Complex
+    start: Complex
+
+
+@lru_cache(maxsize=2)
+def modes_from_rest(
     modes: PlateModes, pressure: MovingPressure, material: Material, middle: tuple[float, float],
-    highest: float,
-) -> tuple[Floats, Complex, FreeModes, Complex]:  # fmt: skip
-    """Return frequencies (f,) in Hz and steady coordinates (f, m) of the lines below `highest`, the
-    free modes, and the amplitudes (m, j) of their vibration; kept, because several runs need them.
+    highest: float = np.inf,
+) -> ModesFromRest:  # fmt: skip
+    """Return the motion from rest under the lines of a load below `highest` Hz; kept, because
+    several runs need it.
     """
 
     def modulus(omega: Floats) -> Floats:
@@ -94,22 +103,22 @@ def _linear_parts(
 
     f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
     f, forces = f[f < highest], forces[f < highest]
-    motion = modal_motion(modes, f, forces, modulus)
+    motion, free = modal_motion(modes, f, forces, modulus), free_modes(modes, material)
     coupling = motion - modal_motion_apart(modes, f, forces, modulus)
-    free = free_modes(modes, material)
     start = free.start(f, forces)
     start -= free.impulse(coupling.real.sum(axis=0), (2j * np.pi * f @ coupling).real)
-    return f, motion, free, start
+    return ModesFromRest(frequencies=f, forces=forces, motion=motion, poles=free.poles, start=start)
 
 
 def stretched_motion(
     plate: KarmanPlate, linear: Floats, dt: float, material: Material | None = None
-) -> Motion:
-    """Motion from rest, at 0, dt, ..., (n - 1) dt in s. Without stretching, the load would move the
-    plate by `linear` (n, r) in kg^1/2 m, the `linear_motion` of the chosen modes.
+) -> Floats:
+    """Coordinates (n, r) in kg^1/2 m from rest, at 0, dt, ..., (n - 1) dt in s. Without stretching,
+    the load would move the plate by `linear` (n, r) in kg^1/2 m, the `linear_motion` of the chosen
+    modes.
     """
-    forces = _Scheme.of(plate, dt, material).forces(linear)
-    return forced_motion(plate, forces, dt, material)
+    rest = np.zeros((2, linear.shape[1]))
+    return _motion(plate, np.zeros_like(linear[1:]), linear, dt, material, rest)
 
 
 def forced_motion(
@@ -119,43 +128,80 @@ def forced_motion(
     material: Material | None = None,
     *,
     start: Floats | None = None,
-) -> Motion:
-    """Motion at the n + 1 times 0, dt, ..., n dt under forces (n, r) in N kg^-1/2 on the chosen
-    modes.
+) -> Floats:
+    """Coordinates (n + 1, r) in kg^1/2 m at the times 0, dt, ..., n dt under forces (n, r) in N
+    kg^-1/2 on the chosen modes.
 
-    It starts from `start` (2, r), coordinates in kg^1/2 m and their rates, or from rest. Without a
-    material it has no loss. Raises an ArithmeticError if a step is not finite.
+    The motion starts from `start` (2, r), coordinates in kg^1/2 m and their rates, or from rest.
+    Without a material it has no loss. Raises an ArithmeticError if a step is not finite.
+    """
+    r = forces.shape[1]
+    start = np.zeros((2, r)) if start is None else start
+    return _motion(plate, forces, np.zeros((len(forces) + 1, r)), dt, material, start)
+
+
+def _motion(
+    plate: KarmanPlate, forces: Floats, linear: Floats, dt: float, material: Material | None,
+    start: Floats,
+) -> Floats:  # fmt: skip
+    """Motion (n + 1, r) that differs from a linear one by the effect of stretching and of forces.
+
+    The linear plate moves exactly: only the difference from it takes the stiffness at rest and the
+    inertia of the steps.
     """
     scheme = _Scheme.of(plate, dt, material)
-    M, K, B, rest = scheme.mass, scheme.K, scheme.bending, scheme.rest
-    shares, pull, stiff = scheme.shares, scheme.pull, scheme.stiff
+    M, K, B, rest, pull = scheme.mass, scheme.K, scheme.bending, scheme.rest, scheme.pull
     keep, follow = scheme.keep[:, None], scheme.follow[:, None]
-    z, energy = np.empty((len(forces) + 1, len(M))), np.empty(len(forces))
-    z[0], rate = np.zeros((2, len(M))) if start is None else start
-    G = plate.gradients(z[0])
+    system, hardening = np.diag(M / dt**2) + scheme.stiff / 2 * B, (rest / 2 + scheme.stiff) / 2
+    inertia = 2 / dt**2 * M
+    after, shift = (
+        np.diag(inertia) - K,
+        np.vstack([linear[1:2] - linear[:1], linear[2:] - linear[:-2]]),
+    )
+    loads = forces + shift @ system
+    z = np.empty_like(linear)
+    z[0], rate = start
+    G, before = plate.gradients(z[0]), z[0] - linear[0]
     y = G @ z[0] / 2
-    unbalanced = forces[0] - K @ z[0] - rest * (y @ G) - scheme.lag * (B @ rate)
-    z[1] = z[0] + dt * rate + dt**2 / 2 * unbalanced / M
-    bent, stretched = follow * (z[1] - z[0]) / 2, follow * (G @ z[1] / 2 - y)  # of the branches
+    unbalanced = forces[0] - K @ before - rest * (y @ G) - scheme.lag * (B @ rate)
+    z[1] = z[0] + shift[0] + dt * rate + dt**2 / 2 * unbalanced / M
+    apart = z[1] - linear[1]
+    bent, stretched = follow * (apart - before) / 2, follow * (G @ z[1] / 2 - y)  # of the branches
     y = G @ z[1] / 2
-    linear, hardening = np.diag(M / dt**2) + stiff / 2 * B, (rest / 2 + stiff) / 2
-    for n in range(len(forces)):
-        if n:
-            G = plate.gradients(z[n])
-            rhs = forces[n] - K @ z[n] + 2 / dt**2 * M * (z[n] - z[n - 1])
-            rhs -= (rest * y + pull @ stretched) @ G + B @ (pull @ bent)
-            _, change, failed = dposv(linear + hardening * (G.T @ G), rhs)
-            if failed:
-                raise ArithmeticError(f"step {n} of dt = {dt:g} s is not finite; lower the load")
-            z[n + 1] = z[n - 1] + change
-            following = G @ z[n + 1] / 2
-            bent = keep * bent + follow * (change / 2)
-            stretched = keep * stretched + follow * (following - y)
-            y = following
+    for n in range(1, len(forces)):
+        G = plate.gradients(z[n])
+        rhs = loads[n] + after @ apart - inertia * before
+        rhs -= (rest * y + pull @ stretched) @ G + B @ (pull @ bent)
+        stiffness = dsyrk(hardening, G.T, beta=1.0, c=system, lower=1)
+        _, change, failed = dposv(stiffness, rhs, lower=1, overwrite_a=1)
+        if failed:
+            raise ArithmeticError(f"step {n} of dt = {dt:g} s is not finite; lower the load")
+        z[n + 1] = z[n - 1] + change
+        before, apart = apart, z[n + 1] - linear[n + 1]
+        following = G @ z[n + 1] / 2
+        bent = keep * bent + follow * ((change - shift[n]) / 2)
+        stretched = keep * stretched + follow * (following - y)
+        y = following
+    return z
+
+
+def energy_between_steps(
+    plate: KarmanPlate, coordinates: Floats, dt: float, material: Material | None = None
+) -> Floats:
+    """Energy (n,) in J between the steps of a motion (n + 1, r) in kg^1/2 m by `forced_motion`."""
+    scheme = _Scheme.of(plate, dt, material)
+    M, K, B, z = scheme.mass, scheme.K, scheme.bending, coordinates
+    keep, follow = scheme.keep[:, None], scheme.follow[:, None]
+    energy, bent, stretched = np.empty(len(z) - 1), np.zeros(1), np.zeros(1)
+    for n in range(len(energy)):
+        G = plate.gradients(z[n])
+        y, before = G @ z[n + 1] / 2, G @ z[max(n - 1, 0)] / 2
+        bent = keep * bent + follow * (z[n + 1] - z[max(n - 1, 0)]) / 2
+        stretched = keep * stretched + follow * (y - before)
         v = (z[n + 1] - z[n]) / dt
-        springs = shares @ ((bent @ B * bent).sum(axis=1) + (stretched**2).sum(axis=1))
-        energy[n] = (v @ (M * v) + z[n + 1] @ K @ z[n] + rest * (y @ y) + springs) / 2
-    return Motion(coordinates=z, energy=energy)
+        springs = scheme.shares @ ((bent @ B * bent).sum(axis=1) + (stretched**2).sum(axis=1))
+        energy[n] = (v @ (M * v) + z[n + 1] @ K @ z[n] + scheme.rest * (y @ y) + springs) / 2
+    return energy
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,17 +246,3 @@ class _Scheme:
     def stiff(self) -> float:
         """Stress of viscosity and branches per change of strain over a step."""
         return self.lag / self.dt + float(self.pull.sum()) / 2
-
-    def forces(self, motion: Floats) -> Floats:
-        """Forces (n - 1, r) under which the steps without stretching are a motion (n, r)."""
-        from scipy.signal import lfilter  # slow to import
-
-        z, dt = motion, self.dt
-        change = np.vstack([z[1:2] - z[:1], z[2:] - z[:-2]]) / 2
-        stress = self.stiff * change
-        for pull, keep, follow in zip(self.pull, self.keep, self.follow, strict=True):
-            stretch = lfilter([follow], [1, -keep], change, axis=0)
-            stress[1:] += pull * stretch[:-1]
-        stress[0] = 0.0
-        inertia = np.vstack([2 * (z[1:2] - z[:1]), z[2:] - 2 * z[1:-1] + z[:-2]]) / dt**2
-        return np.asarray(self.mass * inertia + z[:-1] @ self.K + stress @ self.bending)

@@ -38,7 +38,7 @@ MARGIN = 8  # polynomials more than products of two modes require
 CLIP_MARGIN = 4  # the same on a piece between the sides of clips
 MOST_PAIRS = 500  # of modes, of one symmetry, from which states of stress are made
 EQUAL_BELOW = 2 * np.pi * 200.0  # rad/s: modes below it count as equally strong
-SMALLEST_STATE = 0.03  # of the largest energy norm of a state of stress
+SMALLEST_STATE = 0.06  # of the largest energy norm of a state of stress
 ROUND_OFF = 1e-10  # of the largest energy of a state of stress
 
 
@@ -67,17 +67,19 @@ class KarmanPlate:
     left_out: float
 
     @cached_property
-    def _parts(self) -> list[tuple[slice, Floats, Ints]]:
-        """For the modes of each symmetry: their slice, the nonzero columns of H as a matrix (p,
-        columns), and the places in (k r,) of its product (p,).
+    def _parts(self) -> tuple[list[tuple[slice, Floats]], Ints]:
+        """For the modes of each symmetry: their slice, and the nonzero columns of H as a matrix (p,
+        columns); and where each derivative (k, r) is among all products (p,), followed by a zero.
         """
         of_modes, of_states = self.symmetries
-        parts = []
+        parts, places, first = [], np.full(self.H.shape[:2], -1), 0
         for bits in np.unique(of_modes):
             columns = slice(*np.searchsorted(of_modes, (bits, bits + 1)))
             states, rows = np.nonzero((of_states ^ bits)[:, None] == of_modes)
-            parts.append((columns, self.H[states, rows, columns], states * len(of_modes) + rows))
-        return parts
+            places[states, rows] = first + np.arange(len(states))
+            first += len(states)
+            parts.append((columns, self.H[states, rows, columns]))
+        return parts, np.where(places < 0, first, places)
 
     def shapes(self, points: ArrayLike) -> Floats:
         """Shapes (p, r) in kg^-1/2 of the chosen modes at points (p, 2) in m."""
@@ -85,10 +87,9 @@ class KarmanPlate:
 
     def gradients(self, z: Floats) -> Floats:
         """Derivatives H z (k, r) of the states of stress y at coordinates z (r,)."""
-        derivatives = np.empty(self.H.shape[0] * self.H.shape[1])
-        for columns, part, places in self._parts:
-            derivatives[places] = part @ z[columns]
-        return derivatives.reshape(self.H.shape[:2])
+        parts, places = self._parts
+        products = [part @ z[columns] for columns, part in parts]
+        return np.concatenate([*products, np.zeros(1)]).take(places)
 
 
 def karman_plate(
@@ -120,17 +121,21 @@ def karman_plate(
     chosen = np.sort(np.argsort(modes.squared, kind="stable")[:count])
     squared, slopes = modes.squared[chosen], _Slopes.of(modes, chosen)
     reach = 1 / np.maximum(squared, EQUAL_BELOW**2)
-    A, turns, parts = membrane_stiffness(modes.plate, thickness), [], []
+    A, found = membrane_stiffness(modes.plate, thickness), []
     for odd in product(*((0, 1) if split else (0,) for split in slopes.grid.split)):
         problem = InPlane.of(modes.plate, A, slopes.grid, (odd[0], odd[1]), in_plane)
-        parts.append(_states_of_stress(problem, slopes, reach, turn := 2 * odd[0] + odd[1]))
-        turns.append(np.full(len(parts[-1][0]), turn))
-    energy, H = (np.concatenate(each) for each in zip(*parts, strict=True))
-    strong = energy > SMALLEST_STATE**2 * energy.max()
+        turn = 2 * odd[0] + odd[1]
+        found.append((turn, *_states_of_stress(problem, slopes, reach, turn)))
+    energy = np.concatenate([each for _, each, _ in found])
+    least = SMALLEST_STATE**2 * energy.max()
+    strong = [(turn, states[..., each > least]) for turn, each, states in found]
     return KarmanPlate(
-        modes=modes, chosen=chosen, squared=squared, bending=_bending(modes, chosen), H=H[strong],
-        symmetries=(slopes.symmetries, np.concatenate(turns)[strong]),
-        left_out=float(np.sqrt(energy[~strong].sum() / energy.sum())),
+        modes=modes, chosen=chosen, squared=squared, bending=_bending(modes, chosen),
+        H=np.concatenate([slopes.stiffness(turn, states) for turn, states in strong]),
+        symmetries=(
+            slopes.symmetries, np.repeat(*zip(*((t, s.shape[-1]) for t, s in strong), strict=True)),
+        ),
+        left_out=float(np.sqrt(energy[energy <= least].sum() / energy.sum())),
     )  # fmt: skip
 
 
@@ -228,13 +233,13 @@ def _states_of_stress(
     problem: InPlane, slopes: _Slopes, reach: Floats, turn: int
 ) -> tuple[Floats, Floats]:
     """States of stress of one symmetry, orthonormal in energy, from the strongest pairs of modes:
-    relative energy (k,) of stretching in each, and stiffness H (k, r, r).
+    relative energy (k,) of stretching in each, and its stress resultants times areas (3, x, y, k).
     """
     i, j = slopes.pairs(turn)
     order = np.argsort(-reach[i] * reach[j], kind="stable")[:MOST_PAIRS]
     i, j = i[order], j[order]
     if not len(i):
-        return np.zeros(0), np.zeros((0, len(reach), len(reach)))
+        return np.zeros(0), np.zeros((3, *slopes.grid.areas.shape, 0))
     weight = reach[i] * reach[j] * np.where(i == j, 1, 2) / reach.max() ** 2
     strains = problem.incompatible(slopes.stretching(i, j) * weight[:, None, None])
     weighted = np.tensordot(problem.A, strains, axes=1) * slopes.grid.areas
@@ -242,5 +247,4 @@ def _states_of_stress(
     energy, vectors = np.linalg.eigh((gram + gram.T) / 2)
     strong = energy > ROUND_OFF * energy[-1]
     scaled = vectors[:, strong] / np.sqrt(energy[strong])
-    states = np.tensordot(weighted, scaled, axes=([1], [0]))
-    return energy[strong], slopes.stiffness(turn, states)
+    return energy[strong], np.tensordot(weighted, scaled, axes=([1], [0]))

@@ -3,8 +3,8 @@ steady state, from rest, and at large deflection by von Karman's equations.
 
 At large deflection, the motion without stretching is that of `plate-modes-transient`, with all
 modes and without time steps. Time steps of the lowest modes add the effect of stretching. The
-numbers of steps and modes follow from the tolerance and from the change with steps twice as long
-and with fewer modes. They are chosen for the first part of a response, and confirmed by the whole.
+numbers of steps and modes follow from the tolerance and from the change with longer steps and with
+fewer modes over the whole response. Richardson's extrapolation reduces the error of the steps.
 
 A thin plate has no shear and no rotary inertia. Their effect on the motion of each mode, by
 `thick_plate`, is part of the expected error.
@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise
-from math import ceil
+from math import ceil, sqrt
 from typing import Any
 
 import numpy as np
@@ -25,18 +25,16 @@ from fem.reduced import exponential_sum
 from simple_model import Effort, ErrorPart, MovingPressure, Response, Statement
 from simple_model.layers.compliance import AIR_DENSITY, thick_plate
 from simple_model.load.sampling import below_half_the_rate, highest_driving, step
-from simple_model.load.spectrum import lines_from_rest, synthesise
+from simple_model.load.spectrum import synthesise
 from simple_model.plates.free_modes import free_modes
-from simple_model.plates.karman_motion import linear_motion, stretched_motion
+from simple_model.plates.karman_motion import linear_motion, modes_from_rest, stretched_motion
 from simple_model.plates.modes import (
     Plate,
     PlateModes,
-    modal_motion,
     modal_motion_apart,
     plate_modes,
     scaled_modes,
 )
-from simple_model.plates.path_forces import modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate, karman_plate
 from skinwave.bodies.body import Body
 from skinwave.bodies.supports import EDGES
@@ -64,11 +62,14 @@ KARMAN = (
 )
 LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
 COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number compared with the one before
-FIRST_DURATION = 0.2  # s of a response, at least, for which steps and modes are chosen
+FIRST_DURATION = 0.2  # s of a response, at least, that decides whether a sheet stretches
+NEGLIGIBLE_LINE = 1e-4  # of the strongest: weaker lines do not change the sensitivity
 NEGLIGIBLE_MODE = 1e-4  # of the mode that moves most: weaker modes do not show on a map
-SHARE = 0.3  # of the tolerance, for the change by longer steps and fewer modes
-# Error over this change: 0.2 to 1.7, because modes converge slowly near a resonance.
+SHARE = 0.6  # of the tolerance, for the error of steps and modes
+# Error over the change by fewer modes: 0.2 to 1.7, because modes converge slowly near a resonance.
 TRUNCATION = 2.0
+EXTRAPOLATED = 0.5  # of the error of the steps, left by extrapolation: 0.02 to 0.3
+LEAST_RATIO = 1.5  # of two lengths of steps that are extrapolated
 DEGREE = 5  # of the splines that are differentiated
 
 
@@ -94,7 +95,7 @@ _karman = lru_cache(maxsize=6)(karman_plate)
 
 def middle_compliance(body: Body) -> float:
     """Return the static deflection at the middle of a supported sheet per force there, in m/N."""
-    modes = modes_of(plate_of(replace(body, air=False)))
+    modes = modes_of(plate_of(body))
     at_rest = relative_modulus(body, 0.0).real
     stiffness = modes.squared * (1 + (at_rest - 1) * modes.elastic)
     return float((modes.at([[0.0, 0.0]]) ** 2 / stiffness).sum())
@@ -110,13 +111,16 @@ class Driven:
     """Modes of a scene's plate under its load; `outputs` (p, m) are their shapes at the probes.
 
     The load has lines at `frequencies` (f,) in Hz with modal `forces` (f, m) in N kg^-1/2, and
-    `motion` (f, m) in the steady state.
+    `motion` (f, m) in the steady state. From rest, they add exp(t `poles` (m, j)) with the
+    amplitudes `start` (m, j).
     """
 
     modes: PlateModes
     frequencies: Floats
     forces: Complex
     motion: Complex
+    poles: Complex
+    start: Complex
     outputs: Floats
 
 
@@ -180,14 +184,12 @@ def effect_of(change: Callable[[Body, PlateModes], Factors], scene: Scene, sampl
 
     `change` returns the factors (m,) of a body's modes.
     """
-    times, modulus = sample_times(scene)[:samples], partial(relative_modulus, scene.body)
-    driven, values = _uncoupled(scene, samples)
+    times, (driven, values) = sample_times(scene)[:samples], _uncoupled(scene, samples)
     count = len(driven.modes.squared)
     bending, mass = (np.broadcast_to(f, count) for f in change(scene.body, driven.modes))
     modes = scaled_modes(driven.modes, bending=bending, mass=mass)
     forces, outputs = (each / np.sqrt(mass) for each in (driven.forces, driven.outputs))
-    motion = modal_motion_apart(modes, driven.frequencies, forces, modulus)
-    other = replace(driven, modes=modes, forces=forces, outputs=outputs, motion=motion)
+    other = _apart(replace(driven, modes=modes, forces=forces, outputs=outputs), scene.body)
     changed = _from_rest(scene, other, times)
     return float(relative_changes(changed - values, changed).max())
 
@@ -204,30 +206,33 @@ def _detuned(body: Body, modes: PlateModes) -> Factors:
 
 @lru_cache(maxsize=2)
 def _uncoupled(scene: Scene, samples: int) -> tuple[Driven, Floats]:
-    """Return the motion from rest (t, p) without coupling between modes, and its modes."""
+    """Return the motion from rest (t, p) without coupling between modes, and its modes, under the
+    lines that matter.
+    """
     times = sample_times(scene)[:samples]
-    driven = _drive(scene, times, motion=modal_motion_apart)
+    driven = _drive(scene, times)
+    sizes = np.linalg.norm(driven.motion, axis=1)
+    strong = sizes > NEGLIGIBLE_LINE * sizes.max(initial=0.0)
+    driven = replace(driven, frequencies=driven.frequencies[strong], forces=driven.forces[strong])
+    driven = _apart(driven, scene.body)
     return driven, _from_rest(scene, driven, times)
 
 
-def _drive(
-    scene: Scene,
-    times: Floats,
-    progress: Progress = silent,
-    motion: Callable[..., Complex] = modal_motion,
-) -> Driven:
+def _apart(driven: Driven, body: Body) -> Driven:
+    """Return the motion under the same forces without coupling between modes."""
+    f, forces, free = driven.frequencies, driven.forces, free_modes(driven.modes, body.solid)
+    motion = modal_motion_apart(driven.modes, f, forces, partial(relative_modulus, body))
+    return replace(driven, motion=motion, poles=free.poles, start=free.start(f, forces))
+
+
+def _drive(scene: Scene, times: Floats, progress: Progress = silent) -> Driven:
     body, pressure = scene.body, scene.pressure
     progress("modes", 0.0)
     modes: PlateModes = modes_of(plate_of(body))
     progress("lines", 0.0)
-    middle = body.placement.offset
-    f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
-    driving = f < highest_driving(pressure, times)
-    f, forces = f[driving], forces[driving]
-    return Driven(
-        modes=modes, frequencies=f, forces=forces, outputs=modes.at(scene.probe_points - middle),
-        motion=motion(modes, f, forces, partial(relative_modulus, body)),
-    )  # fmt: skip
+    x, y = body.placement.offset
+    driven = modes_from_rest(modes, pressure, body.solid, (x, y), highest_driving(pressure, times))
+    return Driven(modes=modes, outputs=modes.at(scene.probe_points - (x, y)), **vars(driven))
 
 
 def _response(
@@ -258,20 +263,12 @@ def _amplitudes(scene: Scene, driven: Driven) -> Complex:
 
 
 def _free_vibration(scene: Scene, driven: Driven, times: Floats) -> Floats:
-    """Return the free vibration (t, p) after the state of rest before t = 0. Uncoupled modes are
-    solved separately; coupled ones such that all are at rest at t = 0.
-    """
-    modes, f, forces = driven.modes, driven.frequencies, driven.forces
-    free = free_modes(modes, scene.body.solid)
-    uncoupled = modal_motion_apart(modes, f, forces, partial(relative_modulus, scene.body))
-    coupling = driven.motion - uncoupled
-    speed = (2j * np.pi * f @ coupling).real
-    start = free.start(f, forces) - free.impulse(coupling.real.sum(axis=0), speed)
-    start *= scene.reading.record.factor(free.poles)
-    vibrates = free.residues != 0
+    """Return the free vibration (t, p) after the state of rest before t = 0."""
+    vibrates = driven.start != 0
+    rates = driven.poles[vibrates]
     outputs = np.broadcast_to(driven.outputs.T[:, None], (*vibrates.shape, len(driven.outputs)))
-    amplitudes = start[vibrates][:, None] * outputs[vibrates]
-    return exponential_sum(free.poles[vibrates], amplitudes, times)
+    amplitudes = driven.start[vibrates] * scene.reading.record.factor(rates)
+    return exponential_sum(rates, amplitudes[:, None] * outputs[vibrates], times)
 
 
 def limits(scene: Scene) -> Iterator[Limit]:
@@ -324,10 +321,11 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
     modes: PlateModes = modes_of(plate_of(scene.body))
     options.progress("large deflection", 0.0)
     found = _stretch(scene, len(times), step(times), options.tolerance, options.dt)
+    used = found.runs[0][1]
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
-        reduced_dofs=found.count, steps=found.parts * (len(times) - 1),
-        dt=step(times) / found.parts, peak_memory=peak_memory(),
+        reduced_dofs=used.count, steps=used.steps,
+        dt=float(times[-1]) / used.steps, peak_memory=peak_memory(),
         errors=Statement(
             parts=(ERROR, thin_plate_part(scene), found.error), tolerance=options.tolerance
         ),
@@ -343,9 +341,8 @@ def first_part(scene: Scene, times: Floats) -> Floats:
 
 def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
     """Return the largest relative error of a linear response (t, p) from rest."""
-    modes: PlateModes = modes_of(plate_of(scene.body))
-    parts = ceil(step(times) / LONGEST - 1e-9)
-    stretching = _stretching(scene, times, min(COUNTS[0], len(modes.squared)), parts)
+    count = min(COUNTS[0], len(modes_of(plate_of(scene.body)).squared))
+    stretching = _stretching(scene, times, Run(count=count, steps=_step_count(times, LONGEST)))
     return float(relative_changes(stretching, linear + stretching).max())
 
 
@@ -354,29 +351,42 @@ def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Callab
     """Return the motion of a whole sheet from rest: times (t,) in s, coordinates (t, m) in kg^1/2 m
     of all modes that move, and the function of their shapes (p, m) at places (p, 2) in m.
     """
-    times, middle = sample_times(scene), scene.body.placement.offset
-    modes: PlateModes = modes_of(plate_of(scene.body))
-    found = _stretch(scene, len(times), step(times), tolerance, None)
-    plate, stretching = _coordinates(
-        scene.pressure, scene.body, len(times), step(times), found.count, found.parts
-    )
-    sizes = np.linalg.norm(_drive(scene, times).motion, axis=0)
-    moving = np.union1d(np.flatnonzero(sizes > NEGLIGIBLE_MODE * sizes.max()), plate.chosen)
-    z = linear_motion(modes, scene.pressure, scene.body.solid, times, middle=middle, chosen=moving)
-    z[:, np.searchsorted(moving, plate.chosen)] += stretching[:: found.parts]
+    times, body, pressure = sample_times(scene), scene.body, scene.pressure
+    middle, modes = body.placement.offset, modes_of(plate_of(body))
+    found, driven = _stretch(scene, len(times), step(times), tolerance, None), _drive(scene, times)
+    driving = highest_driving(pressure, times)
+    stretching = [
+        (weight, *_coordinates(pressure, body, float(times[-1]), run, driving))
+        for weight, run in found.runs
+    ]
+    sizes, chosen = np.linalg.norm(driven.motion, axis=0), [p.chosen for _, p, _ in stretching]
+    moving = np.union1d(np.flatnonzero(sizes > NEGLIGIBLE_MODE * sizes.max()), np.hstack(chosen))
+    z = linear_motion(
+        modes, pressure, body.solid, times, middle=middle, chosen=moving,
+        driving=driving, highest=0.5 / step(times),
+    )  # fmt: skip
+    for weight, plate, coordinates in stretching:
+        z[:, np.searchsorted(moving, plate.chosen)] += weight * _at(coordinates, times)
     return times, z, lambda places: modes.at(places - middle)[:, moving]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A computation of what stretching adds, with `count` modes in `steps` time steps."""
+
+    count: int
+    steps: int
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stretching:
-    """What stretching adds to a `linear` response (t, p), `values` (t, p), with `count` modes, and
-    `parts` time steps for each sample, and the `error` of both.
+    """What stretching adds to a `linear` response (t, p), `values` (t, p): the sum of `runs`
+    times their weights, the first with most modes and shortest steps; and the `error` of both.
     """
 
     linear: Floats
     values: Floats
-    count: int
-    parts: int
+    runs: tuple[tuple[float, Run], ...]
     error: ErrorPart
 
 
@@ -386,65 +396,57 @@ def _stretch(
 ) -> Stretching:  # fmt: skip
     """Return what stretching adds at every `sample` in s, within the tolerance if possible.
 
-    The whole record is solved with what its first part needs, and with more if that is too little:
-    a resonance may build up slowly, and errors grow with it.
+    Errors are those of the whole record: a resonance may build up slowly. Steps are chosen with the
+    fewest modes, and modes are compared in the longest steps. Steps of two lengths give the limit
+    of short steps by Richardson's extrapolation.
     """
     times: Floats = sample * np.arange(samples, dtype=np.float64)
-    options = SolveOptions(tolerance=tolerance, dt=dt)
-    linear = FROM_REST.solve(scene, times, options).values
-    start = first_part(scene, times)
-    found = _resolve(scene, start, options, linear[: len(start)])
-    if len(start) < len(times):
-        found = _resolve(scene, times, options, linear, (found.count, found.parts))
-    return found
+    linear = FROM_REST.solve(scene, times, SolveOptions(tolerance=tolerance, dt=dt)).values
+    allowed, most = SHARE * tolerance, len(modes_of(plate_of(scene.body)).squared)
+    counts = [min(count, most) for count in COUNTS]
+    first, base = counts[0], _step_count(times, dt or LONGEST)
+    finest = base if dt else max(base, _step_count(times, SHORTEST))
+    values = lru_cache(partial(_stretching, scene, times))
 
+    def change(run: Run, other: Run) -> float:
+        found = values(run)
+        return float(relative_changes(found - values(other), linear + found).max())
 
-def _resolve(
-    scene: Scene, times: Floats, options: SolveOptions, linear: Floats,
-    least: tuple[int, int] = (0, 1),
-) -> Stretching:  # fmt: skip
-    """Return what stretching adds, with at least the given numbers of modes and of parts."""
-    sample, allowed = step(times), SHARE * options.tolerance
-    modes: PlateModes = modes_of(plate_of(scene.body))
-    counts = [min(count, len(modes.squared)) for count in COUNTS]
-    # A record of few samples cannot have longer steps.
-    parts = max(least[1], 1 + (len(times) <= 4 * DEGREE))
-    parts = max(parts, ceil(sample / (options.dt or LONGEST) - 1e-9))
-    solved = partial(_stretching, scene, times)
+    def by_steps(count: int, steps: int, fewer: int) -> float:
+        """Return what extrapolation leaves of the error of the steps, which is of second order."""
+        run, other = (Run(count=count, steps=n) for n in (steps, fewer))
+        return EXTRAPOLATED * change(run, other) / ((steps / fewer) ** 2 - 1)
 
-    def with_longer_steps(count: int) -> tuple[Floats, int, float]:
-        """Return the values with longer steps, their stride, and the ratio of the steps."""
-        if parts > 1:
-            return solved(count, parts // 2), 1, parts / (parts // 2)
-        return _stretching(scene, times[::2], count, 1), 2, 2.0
-
-    def change(other: Floats, stride: int = 1) -> float:
-        whole = (linear + values)[::stride]
-        return float(relative_changes(values[::stride] - other, whole).max())
-
-    for fewer, count in pairwise(counts):
-        if count < least[0]:
-            continue
-        while True:
-            values = solved(count, parts)
-            # Fewer modes in longer steps bound both errors in one run.
-            other, stride, ratio = with_longer_steps(fewer)
-            if (error := change(other, stride)) <= allowed:
-                break
-            other, stride, ratio = with_longer_steps(count)
-            by_steps = change(other, stride) / (ratio**2 - 1)  # of second order
-            if by_steps <= allowed or options.dt or sample / parts <= SHORTEST:
-                error = by_steps + change(solved(fewer, parts))
-                break
-            parts *= 2
-        if error <= 2 * allowed:
+    steps, fewer = base, ceil(base / 2)
+    while (left := by_steps(first, steps, fewer)) > allowed / 2 and steps < finest:
+        ratio = max(LEAST_RATIO, sqrt(left / (allowed / 2)))
+        steps, fewer = min(ceil(ratio * steps), finest), steps
+    for less, count in pairwise(counts):
+        by_modes = TRUNCATION * change(Run(count=count, steps=base), Run(count=less, steps=base))
+        if by_modes + left <= allowed:
             break
-    shorter = f"{sample / parts / 2:.7f}".rstrip("0")
-    part = steps_part(
-        f"{count} modes that stretch, in steps of {1e3 * sample / parts:.3g} ms",
-        TRUNCATION * error, f", or skinwave run --dt {shorter}",
+    same = first if steps == base else count  # without shorter steps, the fewest modes suffice
+    left = by_steps(same, steps, fewer)
+    weight = 1 / ((steps / fewer) ** 2 - 1)
+    runs = (
+        (1.0, Run(count=count, steps=steps)), (weight, Run(count=same, steps=steps)),
+        (-weight, Run(count=same, steps=fewer)),
     )  # fmt: skip
-    return Stretching(linear=linear, values=values, count=count, parts=parts, error=part)
+    dt = times[-1] / steps
+    shorter = f"{dt / 2:.7f}".rstrip("0")
+    part = steps_part(
+        f"{count} modes that stretch, in steps of {1e3 * dt:.3g} ms",
+        by_modes + left, f", or skinwave run --dt {shorter}",
+    )  # fmt: skip
+    added = np.asarray(sum(weight * values(run) for weight, run in runs))
+    return Stretching(linear=linear, values=added, runs=runs, error=part)
+
+
+def _step_count(times: Floats, longest: float) -> int:
+    """Return the number of equal steps that end at the last of times (t,) in s. Twice as long ones
+    are enough for a spline.
+    """
+    return max(2 * DEGREE, ceil(times[-1] / longest - 1e-6))
 
 
 def steps_part(source: str, error: float, more: str = "") -> ErrorPart:
@@ -458,40 +460,45 @@ def _planned_parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
     which the response replaces by its own.
     """
     yield from (ERROR, thin_plate_part(scene))
-    allowed = TRUNCATION * SHARE * options.tolerance
-    yield steps_part("modes that stretch, in time steps", allowed)
+    yield steps_part("modes that stretch, in time steps", SHARE * options.tolerance)
 
 
-def _stretching(scene: Scene, times: Floats, count: int, parts: int) -> Floats:
-    """Return what stretching adds to the quantity (t, p), with `parts` steps per sample."""
-    plate, coordinates = _coordinates(
-        scene.pressure, scene.body, len(times), step(times), count, parts
-    )
+def _stretching(scene: Scene, times: Floats, run: Run) -> Floats:
+    """Return what stretching adds to the quantity (t, p)."""
+    driving = highest_driving(scene.pressure, times)
+    plate, coordinates = _coordinates(scene.pressure, scene.body, float(times[-1]), run, driving)
     values = coordinates @ plate.shapes(scene.probe_points - scene.body.placement.offset).T
-    if rate := scene.reading.record.rate:
-        from scipy.interpolate import make_interp_spline  # slow to import
-
-        steps = step(times) / parts * np.arange(len(coordinates))
-        values = make_interp_spline(steps, values, DEGREE)(steps, rate)
-    return np.asarray(values[::parts])
+    return _at(values, times, scene.reading.record.rate)
 
 
-@lru_cache(maxsize=3)  # the response, the map and the picture of a sheet need the same ones
-def _coordinates(
-    pressure: MovingPressure, body: Body, samples: int, sample: float, count: int, parts: int
-) -> tuple[KarmanPlate, Floats]:
-    """Return the plate, and the coordinates (n, r) in kg^1/2 m that stretching adds at each of
-    `parts` steps of every `sample` in s.
+def _at(values: Floats, times: Floats, rate: int = 0) -> Floats:
+    """Return values (t, p) at times (t,) in s, or their derivatives of order `rate`, from those (n,
+    p) after equal steps to the last time.
     """
-    modes, dt = modes_of(plate_of(body)), sample / parts
-    plate = _karman(modes, body.depth, count)
-    steps = np.asarray(dt * np.arange(parts * (samples - 1) + 1), np.float64)
+    if len(values) == len(times) and not rate:
+        return values
+    from scipy.interpolate import make_interp_spline  # slow to import
+
+    steps = np.linspace(0.0, times[-1], len(values))
+    return np.asarray(make_interp_spline(steps, values, DEGREE)(times, rate))
+
+
+@lru_cache(maxsize=4)  # the response, the map and the picture of a sheet need the same ones
+def _coordinates(
+    pressure: MovingPressure, body: Body, duration: float, run: Run, driving: float
+) -> tuple[KarmanPlate, Floats]:
+    """Return the plate, and the coordinates (n + 1, r) in kg^1/2 m that stretching adds at the ends
+    of n steps, under lines of the load below `driving` Hz.
+    """
+    modes, dt = modes_of(plate_of(body)), duration / run.steps
+    plate = _karman(modes, body.depth, run.count)
+    times = np.linspace(0.0, duration, run.steps + 1)
     # Faster lines hardly deflect the sheet, and do not stretch it.
     linear = linear_motion(
-        modes, pressure, body.solid, steps, middle=body.placement.offset, chosen=plate.chosen,
-        highest=0.5 / dt,
+        modes, pressure, body.solid, times, middle=body.placement.offset, chosen=plate.chosen,
+        driving=driving, highest=0.5 / dt,
     )  # fmt: skip
-    return plate, stretched_motion(plate, linear, dt, body.solid).coordinates - linear
+    return plate, stretched_motion(plate, linear, dt, body.solid) - linear
 
 
 STRETCHED = register(
