@@ -234,9 +234,8 @@ def field_history(
     """All components (t, p, m) of a field from rest, as in `flat_body`."""
     width = _width(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
-    within = max(1, int(np.ceil(step(times) * TRANSFORM_RATE - 1e-6)))
+    within, padded = transform_samples(times)
     dt, n = step(times) / within, (len(times) - 1) * within + 1
-    padded = next_fast_len(PADDING[0] * n + PADDING[1], real=True)
     damping = -np.log(WRAP_AROUND) / (padded * dt)
     w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
     folded = is_folded(pressure, times)
@@ -274,6 +273,14 @@ def field_history(
     t = dt * np.arange(n)[::within]
     u *= passed[:, None, None]
     return np.fft.irfft(u, padded, axis=0)[:n:within] * np.exp(damping * t[:, None, None])
+
+
+def transform_samples(times: Floats) -> tuple[int, int]:
+    """Samples of the transform from one of the times (t,) in s to the next, and in all."""
+    within = max(1, int(np.ceil(step(times) * TRANSFORM_RATE - 1e-6)))
+    return within, next_fast_len(
+        PADDING[0] * ((len(times) - 1) * within + 1) + PADDING[1], real=True
+    )
 
 
 def _sampled_load(
@@ -329,6 +336,11 @@ def _width(pressure: MovingPressure) -> float:
     return width
 
 
+def spline_steps(furthest: float) -> int:
+    """Number of distances of a spline up to a distance in standard deviations of the focal spot."""
+    return max(FEWEST_STEPS, int(np.ceil(furthest * STEPS_PER_WIDTH)))
+
+
 def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
     """Distances (j,) in m of the integrals, and the function from distances (...) to the shares
     (..., j) that interpolate between them: cubic splines, flat at 0; few distances are used
@@ -340,7 +352,7 @@ def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats,
     from scipy.interpolate import CubicSpline  # slow to import
 
     furthest = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
-    steps = max(FEWEST_STEPS, int(np.ceil(furthest / width * STEPS_PER_WIDTH)))
+    steps = spline_steps(furthest / width)
     table = np.linspace(0, furthest, steps)
     flat = (1, np.zeros(steps))
     return table, CubicSpline(table, np.eye(steps), bc_type=(flat, "not-a-knot"))

@@ -3,7 +3,8 @@
     z'' + K z + sum_k s_k H_k z = f,  y_k = z^T H_k z / 2
 
 s_k is the stress of the state y_k; without loss it is y_k itself. Bending and stretching both have
-the loss of the material: a viscosity and Maxwell branches.
+the loss of the material: a viscosity and Maxwell branches. Air and edges damp each mode as at its
+own frequency.
 
 Time steps of dt are linearly implicit, with y between steps:
 
@@ -152,7 +153,8 @@ def _motion(
     scheme = _Scheme.of(plate, dt, material)
     M, K, B, rest, pull = scheme.mass, scheme.K, scheme.bending, scheme.rest, scheme.pull
     keep, follow = scheme.keep[:, None], scheme.follow[:, None]
-    system, hardening = np.diag(M / dt**2) + scheme.stiff / 2 * B, (rest / 2 + scheme.stiff) / 2
+    damping, hardening = plate.damping, (rest / 2 + scheme.stiff) / 2
+    system = np.diag(M / dt**2 + damping / dt / 2) + scheme.stiff / 2 * B
     inertia = 2 / dt**2 * M
     after, shift = (
         np.diag(inertia) - K,
@@ -163,7 +165,7 @@ def _motion(
     z[0], rate = start
     G, before = plate.gradients(z[0]), z[0] - linear[0]
     y = G @ z[0] / 2
-    unbalanced = forces[0] - K @ before - rest * (y @ G) - scheme.lag * (B @ rate)
+    unbalanced = forces[0] - K @ before - rest * (y @ G) - scheme.lag * (B @ rate) - damping * rate
     z[1] = z[0] + shift[0] + dt * rate + dt**2 / 2 * unbalanced / M
     apart = z[1] - linear[1]
     bent, stretched = follow * (apart - before) / 2, follow * (G @ z[1] / 2 - y)  # of the branches

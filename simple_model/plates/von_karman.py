@@ -52,6 +52,7 @@ class KarmanPlate:
     chosen : (r,) int, indices of the modes that stretch it
     squared : (r,) rad2/s2, their squared angular frequencies
     bending : (r, r) rad2/s2, stiffness of bending between them
+    damping : (r,) 1/s, by air and edges
     H : (k, r, r) J^-1/2 s^-2, stiffness that each state of stress adds, in coordinates in kg^1/2 m
     symmetries : (r,) and (k,) int, ascending: bits 2 and 1 mark modes, or states, that are odd
         along x and y. A state acts between modes of which exactly one has each of its bits.
@@ -62,6 +63,7 @@ class KarmanPlate:
     chosen: Ints
     squared: Floats
     bending: Floats
+    damping: Floats
     H: Floats
     symmetries: tuple[Ints, Ints]
     left_out: float
@@ -131,6 +133,7 @@ def karman_plate(
     strong = [(turn, states[..., each > least]) for turn, each, states in found]
     return KarmanPlate(
         modes=modes, chosen=chosen, squared=squared, bending=_bending(modes, chosen),
+        damping=modes.damping[chosen],
         H=np.concatenate([slopes.stiffness(turn, states) for turn, states in strong]),
         symmetries=(
             slopes.symmetries, np.repeat(*zip(*((t, s.shape[-1]) for t, s in strong), strict=True)),

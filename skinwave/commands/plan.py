@@ -8,6 +8,7 @@ from skinwave.commands.common import (
     add_reporting,
     add_scene,
     plan_of_command,
+    progress_of,
     summarise,
 )
 
@@ -28,8 +29,10 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene.file import read
 
     scene = read(options.scene)
-    found = plan_of_command(options, scene)
-    row = mesh_row(replace(scene, body=found.body), found.h, found.error)
+    with progress_of(options) as progress:
+        found = plan_of_command(options, scene, progress=progress)
+        progress("uncertainty", 0.0)
+        row = mesh_row(replace(scene, body=found.body), found.h, found.error)
     found = replace(found, rows=(*found.rows, row))
     width = [max(len(getattr(row, name)) for row in found.rows) for name in ("what", "value")]
     lines = (f"{r.what:<{width[0]}}  {r.value:<{width[1]}}  {r.reason}" for r in found.rows)

@@ -3,7 +3,7 @@
 Importing this package loads no numerical library, because the command line lists the names.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from skinwave.system import extensions
 
 if TYPE_CHECKING:
-    from simple_model import ErrorPart, Response
+    from simple_model import Effort, ErrorPart, Response
     from skinwave.bodies import Body
     from skinwave.models.options import SolveOptions
     from skinwave.scene.scene import Scene
@@ -49,6 +49,33 @@ class Limit:
     change: "Callable[[Scene], Scene] | None" = None
 
 
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """Predicted cost of the first response to a scene.
+
+    Parameters
+    ----------
+    parts : mapping from a change that makes a part cheaper, in the imperative, to the seconds of
+        that part on one core of the machine on which the factors of its formula were measured
+    memory : float, largest memory of the process in bytes
+    long : float, s, above which the largest part's change is worth stating
+    """
+
+    parts: "Mapping[str, float]"
+    memory: float
+    long: float = 30.0
+
+    @property
+    def seconds(self) -> float:
+        """Seconds of all parts."""
+        return sum(self.parts.values())
+
+    @property
+    def cure(self) -> str:
+        """The change that makes the largest part cheaper; "" if the response is not long."""
+        return max(self.parts, key=self.parts.__getitem__) if self.seconds > self.long else ""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
     """Model: how it computes the response of a scene, and its properties.
@@ -66,7 +93,8 @@ class Model:
         the model itself; a plan adds what the model leaves out of the scene. By default nothing is
         known
     default_size : function of a body that returns its element size in m; None without a mesh
-    seconds, memory : predicted cost of a first response, s and bytes, unless a plan measures it
+    cost : function of scene, options with the element size, and the effort of the body that a plan
+        reduced, empty without one, that returns the predicted `Cost`; None if it is unknown
     colour : str, for figures
     sources : tuple of str, references of its method
     quantity : str, name of a quantity that it always computes, such as pressure; or ""
@@ -86,8 +114,7 @@ class Model:
     limits: "Callable[[Scene], Iterable[Limit]] | None" = None
     parts: "Callable[[Scene, SolveOptions], Iterable[ErrorPart]] | None" = None
     default_size: "Callable[[Body], float] | None" = None
-    seconds: float = 0.1
-    memory: float = 1e8
+    cost: "Callable[[Scene, SolveOptions, Effort], Cost] | None" = None
     colour: str = "#56B4E9"
     sources: tuple[str, ...] = ()
     label: str = ""

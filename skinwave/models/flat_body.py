@@ -3,21 +3,46 @@
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from math import isfinite, log, pi
 
 import numpy as np
 
 import simple_model
 from simple_model import Effort, ErrorPart, Response
 from simple_model.layers.compliance import thick_plate
-from simple_model.layers.flat_body import field_history, steady_history
+from simple_model.layers.flat_body import (
+    AT_ONCE,
+    SAMPLE_OFFSETS,
+    TRANSFORM_RATE,
+    WRAP_AROUND,
+    field_history,
+    spline_steps,
+    steady_history,
+    transform_samples,
+)
 from simple_model.layers.flat_quantities import quantity_field, surface_field, traction_field
-from simple_model.layers.wavenumber_integral import Field
-from simple_model.load.focus import gaussian_width
+from simple_model.layers.wavenumber_integral import FEWEST_NODES, MOST_NODES, Field
+from simple_model.load.focus import gaussian_width, spot_width
+from simple_model.load.path_cells import is_abrupt, path_samples
+from simple_model.load.sampling import highest_line, is_folded, oversampling
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies import sheet
 from skinwave.bodies.analytic import compliance, stack
 from skinwave.bodies.parts import FLAT
-from skinwave.models import Limit, Model, register
+from skinwave.bodies.sizes import thicknesses
+from skinwave.models import Cost, Limit, Model, register
+from skinwave.models.costs import (
+    DURATION,
+    LINES,
+    PROBES,
+    PROCESS,
+    START,
+    SYNTHESIS,
+    computed_times,
+    knot_count,
+    lines_below,
+    synthesis,
+)
 from skinwave.models.laws import has_table
 from skinwave.models.limits import (
     displacement_at_surface,
@@ -42,6 +67,12 @@ INTEGRAL_ERROR = 0.002  # compared with finite elements
 SHEARED_DURATION = 0.1  # s of the responses of a thin and a thick sheet that are compared
 # Error of a thin sheet over the effect of shear and rotary inertia: 0.6 to 1.2, by layered bodies.
 INDENTED = 1.25
+# Seconds of a wavenumber, a frequency and a layer; of a sample, a distance and a probe in a
+# transform; of a wavenumber and a distance; of a distance, a probe and a position of the path.
+EVALUATION, TRANSFORM, BESSEL, PATTERN = 2.5e-7, 2.5e-8, 6e-7, 3e-8
+# Evaluations of a transient with much loss; loss tangent at a frequency in Hz below which they
+# increase; wavenumbers of a line times that tangent.
+EVALUATIONS, RESONANT, LOSS_AT, RESONANT_NODES = 1.1e5, 0.12, 200.0, 30.0
 Solve = Callable[[Scene, Floats, SolveOptions], Response]
 
 
@@ -156,6 +187,67 @@ def _with_loss(scene: Scene) -> Scene:
     return of_part("solid", viscosity=viscosity)(scene)
 
 
+def _distances(scene: Scene) -> int:
+    """Return the number of distances at which a field is integrated."""
+    knots, width = path_samples(scene.pressure), spot_width(scene.pressure.height)
+    furthest = max(np.linalg.norm(knots - probe, axis=1).max() for probe in scene.probe_points)
+    return spline_steps(float(furthest) / width)
+
+
+def _integrals(scene: Scene) -> tuple[int, int, float, float]:
+    """Return the numbers of fields and of their integrals, the seconds of a wavenumber at a
+    frequency, and the loss tangent at `LOSS_AT`, which keeps poles off the path of integration.
+    """
+    body, depths = scene.body, sorted(set(scene.depths))
+    layers = sum(isfinite(each) for each in thicknesses(body.strata)) + isfinite(body.depth)
+    fields = [each for depth in depths for each in fields_read(scene, depth)]
+    terms = sum(int(np.count_nonzero(each.weights(SAMPLE_OFFSETS).any(axis=-1))) for each in fields)
+    omega = 2 * pi * LOSS_AT
+    moduli = [solid.complex_modulus(omega) for _, solid in body.strata]
+    loss = max(float(each.imag / each.real) for each in moduli) if isfinite(body.depth) else 1.0
+    return len(fields), terms, EVALUATION * (0.5 + layers), loss
+
+
+def _cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    times, count, distances = computed_times(scene, options), len(scene.probes), _distances(scene)
+    fields, terms, evaluation, loss = _integrals(scene)
+    _, padded = transform_samples(times)
+    damped = loss - 2 * log(WRAP_AROUND) / (padded / TRANSFORM_RATE) / (2 * pi * LOSS_AT)
+    evaluations = fields * EVALUATIONS * max(1.0, (RESONANT / damped) ** 2)
+    parts = oversampling(highest_line(scene.pressure), 1 / TRANSFORM_RATE)
+    folded = is_folded(scene.pressure, times)
+    parts = 1 if folded else max(parts, 1 + is_abrupt(scene.pressure))
+    transformed = terms / fields * count * distances * padded * parts
+    made = count * padded * lines_below(scene, times) * SYNTHESIS[0] if folded else 0.0
+    at_once = min(distances * padded * parts, AT_ONCE)
+    return Cost(
+        parts={
+            f"{PROBES}, or a smaller path": START + TRANSFORM * transformed,
+            LINES: made,
+            "use a material with more loss": evaluation * evaluations,
+        },
+        memory=PROCESS + 48 * at_once + 8 * padded * (3 * count * terms / fields + distances),
+    )
+
+
+def _steady_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    times, distances = computed_times(scene, options), _distances(scene)
+    fields, _, evaluation, loss = _integrals(scene)
+    nodes = min(max(RESONANT_NODES / loss, FEWEST_NODES), MOST_NODES)
+    lines = lines_below(scene, times)
+    seconds, size = synthesis(scene, times)
+    evaluations = 2 * fields * nodes * lines
+    return Cost(
+        parts={
+            DURATION: START + seconds,
+            LINES: PATTERN * len(scene.probes) * distances * (knot_count(scene) + lines),
+            "use a material with more loss": evaluation * evaluations
+            + BESSEL * fields * nodes * distances,
+        },
+        memory=PROCESS + size + 16 * nodes * distances,
+    )
+
+
 FLAT_BODY = register(
     Model(
         name="flat-body",
@@ -164,8 +256,7 @@ FLAT_BODY = register(
         solve=_solver("flat-body", simple_model.flat_body, field_history),
         limits=_limits,
         parts=_parts,
-        seconds=2.0,
-        memory=3e8,
+        cost=_cost,
         colour="#009E73",
         sources=(LAYERS,),
         is_infinite=True,
@@ -181,6 +272,7 @@ HARMONIC = register(
         "wavenumber integral",
         solve=_solver("flat-body-harmonic", simple_model.steady_state, steady_history),
         limits=_steady_limits,
+        cost=_steady_cost,
         colour="#E69F00",
         from_rest="flat-body",
         takes_series=lambda body: False,

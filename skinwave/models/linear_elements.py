@@ -11,6 +11,7 @@ from scipy import sparse
 
 import fem
 from fem.energy import mean_power
+from fem.memory import BYTES_PER_DOF
 from fem.stress import relaxed_stress
 from meshes import MeshError
 from simple_model import Effort, Material, Response
@@ -22,7 +23,20 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
 from skinwave.bodies.parts import PHALANX, PLAIN
 from skinwave.bodies.sizes import check_mesh, default_size
-from skinwave.models import Limit, Model, meshed, register
+from skinwave.models import Cost, Limit, Model, meshed, register
+from skinwave.models.costs import (
+    DURATION,
+    LINES,
+    MESH,
+    PROBES,
+    PROCESS,
+    REDUCED,
+    START,
+    SUMMED,
+    computed_times,
+    lines_below,
+    synthesis,
+)
 from skinwave.models.laws import has_own_law, relaxing, series_tolerance
 from skinwave.models.limits import held_air_limits, of_body, vacuum_limits
 from skinwave.models.options import SolveOptions, response_of, solver_name
@@ -54,6 +68,11 @@ THICKER = 1.25  # from one trial thickness to the next
 BALANCE_STEPS = 50  # of a transient, between checks of its energy balance
 TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
 MOST_LINES = 1000  # of fem-harmonic, each a factorisation
+# For n degrees of freedom, seconds of mesh and matrices over n, of a factorisation over n^1.5, of a
+# solution over n^(4/3), and of products with the matrices over n; bytes of factors over n^(4/3).
+BUILD, FACTOR, SOLUTION, PRODUCT = 3e-5, 1e-7, 3e-8, 6e-7
+COMPLEX_FACTOR, REAL_FACTOR = 700.0, 450.0
+DRIVEN, DRIVEN_PATH = 2e-9, 100  # s of a line and two reduced coordinates; positions of the path
 MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
 
 
@@ -299,6 +318,54 @@ def moved_line(
     return relative + S @ meshed.translation(build, motion.unit) * motion.line, power
 
 
+def _reduced_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    """Return the measured cost of the reduced body, and that of a Tacton on it."""
+    times, modes = computed_times(scene, options), effort.reduced_dofs
+    lines, outputs = (
+        lines_below(scene, times),
+        len(scene.probes) * (1 if scene.reading.record.is_normal else 6),
+    )
+    driven = DRIVEN * lines * (modes + DRIVEN_PATH) * modes
+    read = SUMMED * len(times) * outputs * (lines + 2 * modes)
+    return Cost(
+        parts={MESH: sum(effort.seconds.values()), LINES: START + driven, PROBES: read},
+        memory=max(PROCESS + BYTES_PER_DOF * effort.dofs, effort.peak_memory),
+    )
+
+
+def _line_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    n, lines = effort.dofs, load_lines(scene.loads[0], options.tolerance / 50)
+    count = len(np.unique(np.round(lines.frequencies, 9)))
+    seconds, _ = synthesis(scene, computed_times(scene, options))
+    return Cost(
+        parts={
+            MESH: BUILD * n,
+            DURATION: seconds,
+            REDUCED: FACTOR * n**1.5 * (count + 1) + PRODUCT * n * count,
+        },
+        memory=PROCESS + COMPLEX_FACTOR * n ** (4 / 3),
+    )
+
+
+def _stepped_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    axes = meshed.modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
+    n = effort.dofs * 2 ** len(axes)  # the whole body
+    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    steps = step_count(float(computed_times(scene, options)[-1]), dt)
+    return Cost(
+        parts={
+            MESH: BUILD * n + FACTOR * n**1.5,
+            REDUCED: steps * step_seconds(n),
+        },
+        memory=PROCESS + REAL_FACTOR * n ** (4 / 3),
+    )
+
+
+def step_seconds(n: float) -> float:
+    """Return the seconds of a time step of n degrees of freedom: a solution, and products."""
+    return SOLUTION * n ** (4 / 3) + PRODUCT * n
+
+
 FEM = register(
     Model(
         name="fem",
@@ -307,6 +374,7 @@ FEM = register(
         solve=_solve_reduced,
         default_size=default_size,
         limits=partial(_limits, held_air_limits, True),
+        cost=_reduced_cost,
         colour="#0072B2",
         sources=(REDUCTION, ARNOLDI, MACROELEMENTS),
         is_reduced=True,
@@ -321,6 +389,7 @@ HARMONIC = register(
         words="the steady state of linear waves on 10-node tetrahedra",
         solve=harmonic_answer,
         limits=partial(_limits, vacuum_limits, True),
+        cost=_line_cost,
         colour="#CC79A7",
         sources=(MACROELEMENTS,),
         from_rest="fem",
@@ -336,6 +405,7 @@ TRANSIENT = register(
         words="linear waves on 10-node tetrahedra, step by step",
         solve=transient_answer,
         limits=partial(_limits, vacuum_limits, False),
+        cost=_stepped_cost,
         colour="#D55E00",
         sources=(NEWMARK, MACROELEMENTS),
         is_reduced=False,

@@ -38,7 +38,18 @@ from simple_model.plates.modes import (
 from simple_model.plates.von_karman import KarmanPlate, karman_plate
 from skinwave.bodies.body import Body
 from skinwave.bodies.supports import EDGES
-from skinwave.models import Limit, Model, named, register
+from skinwave.models import Cost, Limit, Model, named, register
+from skinwave.models.costs import (
+    DURATION,
+    LINES,
+    PROBES,
+    PROCESS,
+    START,
+    SUMMED,
+    computed_times,
+    lines_below,
+    synthesis,
+)
 from skinwave.models.laws import has_own_law, slowest_and_fastest
 from skinwave.models.limits import clamped_sheet_limits, of_body, surface_limits, takes
 from skinwave.models.options import SolveOptions, response_of, sample_times
@@ -70,6 +81,11 @@ SHARE = 0.6  # of the tolerance, for the error of steps and modes
 TRUNCATION = 2.0
 EXTRAPOLATED = 0.5  # of the error of the steps, left by extrapolation: 0.02 to 0.3
 LEAST_RATIO = 1.5  # of two lengths of steps that are extrapolated
+# Seconds of two modes of one symmetry, in the modes, and in a line with tension; of a line and a
+# mode; of the states of stress, and of a time step at large deflection with all its repetitions;
+# bytes of a sample, a probe and a mode, and of a step.
+OF_MODES, COUPLED_LINE, MODAL_FORCE = 2e-7, 1.7e-8, 1e-7
+OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = 1.5, 4e-4, 0.7, 6e3
 DEGREE = 5  # of the splines that are differentiated
 
 
@@ -286,6 +302,25 @@ def limits(scene: Scene) -> Iterator[Limit]:
     yield from surface_limits(scene)
 
 
+def _cost(from_rest: bool, scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    """Return the cost of the steady state, and of a start from rest."""
+    times, modes = computed_times(scene, options), modes_of(plate_of(scene.body))
+    sizes = np.array([len(family.squared) for family in modes.families])
+    lines, pairs = lines_below(scene, times), int((sizes**2).sum())
+    coupled = any(family.bending is not None for family in modes.families)
+    seconds, size = synthesis(scene, times)
+    summed = len(times) * len(scene.probes) * int(sizes.sum()) if from_rest else 0
+    return Cost(
+        parts={
+            "use a smaller sheet": START + OF_MODES * pairs,
+            LINES: lines * (COUPLED_LINE * pairs * coupled + MODAL_FORCE * int(sizes.sum())),
+            PROBES: SUMMED * summed,
+            DURATION: seconds,
+        },
+        memory=PROCESS + size + OF_SUM * summed,
+    )
+
+
 MODES = register(
     Model(
         name="plate-modes",
@@ -294,8 +329,7 @@ MODES = register(
         solve=steady_answer,
         limits=limits,
         parts=lambda scene, options: [ERROR, thin_plate_part(scene)],
-        seconds=0.5,
-        memory=2e8,
+        cost=partial(_cost, False),
         colour="#F0E442",
         sources=(PLATES,),
         from_rest="plate-modes-transient",
@@ -308,6 +342,7 @@ FROM_REST = register(
         from_rest="",
         takes_series=has_own_law,
         solve=answer_from_rest,
+        cost=partial(_cost, True),
         method="modes of a thin plate by Ritz's method, from rest",
         words="a thin plate from rest, in its modes by Ritz's method",
         colour="#8C510A",
@@ -501,6 +536,21 @@ def _coordinates(
     return plate, stretched_motion(plate, linear, dt, body.solid) - linear
 
 
+def _stretched_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    """Return the cost of the linear motion, solved twice, and of the steps with stretching."""
+    linear, times = _cost(True, scene, options, effort), computed_times(scene, options)
+    parts = ceil(step(times) / (options.dt or LONGEST) - 1e-9)
+    steps = (len(times) + len(first_part(scene, times))) * parts
+    return Cost(
+        parts={
+            **linear.parts,
+            LINES: 2 * linear.parts[LINES],
+            DURATION: OF_STATES + STRETCHED_STEP * steps,
+        },
+        memory=linear.memory + OF_STEP * steps,
+    )
+
+
 STRETCHED = register(
     replace(
         FROM_REST,
@@ -509,8 +559,7 @@ STRETCHED = register(
         words="a thin plate in bending and stretching, from rest, with modes by Ritz's method",
         solve=stretched_answer,
         parts=_planned_parts,
-        seconds=5.0,
-        memory=4e8,
+        cost=_stretched_cost,
         colour="#4D4D9F",
         sources=(PLATES, KARMAN),
         is_nonlinear=True,

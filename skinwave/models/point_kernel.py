@@ -3,9 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from simple_model import ErrorPart, Response, point_kernel, point_kernel_published
+from simple_model import Effort, ErrorPart, Response, point_kernel, point_kernel_published
+from simple_model.load.sampling import highest_line, oversampling, step
 from simple_model.quantities import PRESSURE
-from skinwave.models import Limit, Model, register
+from skinwave.models import Cost, Limit, Model, register
+from skinwave.models.costs import PROBES, PROCESS, START, computed_times
 from skinwave.models.limits import load_limit
 from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Scene
@@ -14,6 +16,8 @@ from skinwave.typing import Floats
 NO_WAVES = ErrorPart(  # on any body, measured 0.98 to 1.04
     name="no waves", source="the point kernel", error=1.0, cure="use a model with waves"
 )
+
+SPOT = 1e-8  # s of the pressure of a focus at a probe and a sample
 
 
 def _same_load(scene: Scene, times: Floats, options: SolveOptions) -> Response:
@@ -29,6 +33,14 @@ def _limits(scene: Scene) -> Iterator[Limit]:
         yield load_limit(scene)
 
 
+def _cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    times = computed_times(scene, options)
+    parts = oversampling(highest_line(scene.pressure), step(times))
+    values = len(times) * parts * len(scene.probes)
+    seconds = START + SPOT * values * len(scene.tacton.foci)
+    return Cost(parts={PROBES: seconds}, memory=PROCESS + 24 * values)
+
+
 SAME_LOAD = register(
     Model(
         name="point-kernel",
@@ -37,6 +49,7 @@ SAME_LOAD = register(
         words="the local pressure in Pa, from the distance to the moving focus; nothing propagates",
         solve=_same_load,
         parts=lambda scene, options: [NO_WAVES],
+        cost=_cost,
         colour="#000000",
         limits=_limits,
         quantity=PRESSURE.name,

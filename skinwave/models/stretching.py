@@ -22,6 +22,7 @@ import numpy as np
 
 import fem
 from fem import nonlinear
+from fem.memory import BYTES_PER_DOF
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from meshes import middle_plane
 from simple_model import Effort, ErrorPart, Material, Response, Statement
@@ -30,7 +31,8 @@ from simple_model.load.spectrum import load_lines
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
-from skinwave.models import Limit, Model, limits, linear_elements, reduced, register
+from skinwave.models import Cost, Limit, Model, limits, linear_elements, reduced, register
+from skinwave.models.costs import DURATION, MESH, MODES, PROCESS, computed_times, lines_below
 from skinwave.models.laws import has_own_law
 from skinwave.models.linear_elements import NEWMARK, TRANSIENT_RATE
 from skinwave.models.meshed import load_in_steps, surface_load, with_cost
@@ -55,6 +57,12 @@ FULL_CELLS, REDUCED_CELLS = 26, 32  # along the shorter side
 COARSE_ERROR, ERROR_ORDER = 0.05, 3.0  # of a waveform with FULL_CELLS; measured order 3.2
 HIGHEST_MODE = 1500.0  # Hz, of the modes in the basis
 FEWEST_MODES, MOST_MODES = 40, 160
+# Seconds of reducing a degree of freedom to a mode; of a step, of two modes in it, and of a line of
+# the load and a mode in it; bytes of a degree of freedom and a mode.
+REDUCE, MARCH, MODE_PAIR, LINE, BYTES_PER_MODE = 3.6e-6, 5e-4, 1.5e-7, 4e-9, 70.0
+# Of the full model: seconds of the forces of a degree of freedom, iterations in a step, and memory
+# over that of linear models.
+DOFS_PER_CELL, ELEMENTS, ITERATIONS, FULL_MEMORY = 36.0, 1.2e-6, 3, 2.0
 RATES = DISPLACEMENT, VELOCITY, ACCELERATION
 MOST_LINES = 500  # of a load that are summed in each step
 
@@ -306,6 +314,36 @@ def _parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
     yield mesh_part(h, expected_error(scene.body, h))
 
 
+def _sheet_dofs(body: Body, h: float) -> float:
+    """Return the approximate number of degrees of freedom of a meshed sheet."""
+    return DOFS_PER_CELL * body.width * body.height / h**2
+
+
+def _reduced_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    n, r = _sheet_dofs(scene.body, options.h or REDUCED_SIZE(scene.body)), mode_count(scene.body)
+    times = computed_times(scene, options)
+    steps = _steps(scene, options)
+    step = MARCH + MODE_PAIR * r**2 + LINE * min(MOST_LINES, lines_below(scene, times)) * r
+    return Cost(
+        parts={MESH: REDUCE * n * r, DURATION: steps * step},
+        memory=PROCESS + (BYTES_PER_DOF + BYTES_PER_MODE * r) * n,
+    )
+
+
+def _full_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
+    n = _sheet_dofs(scene.body, options.h or FULL_SIZE(scene.body))
+    step = ITERATIONS * (ELEMENTS * n + linear_elements.step_seconds(n))
+    return Cost(
+        parts={MODES: _steps(scene, options) * step},
+        memory=PROCESS + FULL_MEMORY * BYTES_PER_DOF * n,
+    )
+
+
+def _steps(scene: Scene, options: SolveOptions) -> int:
+    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    return linear_elements.step_count(float(computed_times(scene, options)[-1]), dt)
+
+
 REDUCED_SIZE, FULL_SIZE = (partial(stretching_size, reduced=reduced) for reduced in (True, False))
 REDUCED = register(
     Model(
@@ -315,6 +353,7 @@ REDUCED = register(
         solve=reduced_answer,
         limits=partial(_limits, limits.held_air_limits, REDUCED_SIZE),
         parts=_parts,
+        cost=_reduced_cost,
         default_size=REDUCED_SIZE,
         sources=(NEWMARK, NEWTON),
         is_nonlinear=True,
@@ -328,6 +367,7 @@ FULL = register(
         words="a sheet that stretches as it bends, on 10-node tetrahedra, step by step",
         solve=full_answer,
         limits=partial(_limits, limits.vacuum_limits, FULL_SIZE),
+        cost=_full_cost,
         default_size=FULL_SIZE,
     )
 )

@@ -33,7 +33,9 @@ class Plan:
     h : float or None, element size in m; None without a mesh
     highest : float, highest relevant line of the load in Hz
     statement : Statement, the parts of the expected error
-    seconds, memory : float, predicted cost of the first response in s and bytes
+    seconds, memory : float or None, cost of the first response in s of one core and in bytes,
+        without plan, maps and page: predicted, or measured for a body that the plan reduced; None
+        if unknown
     rows : tuple of PlanRow, the decisions with their reasons
     cautions : tuple of str, warnings apart from those of the expected error
     prepared : ReducedBody or None, the body reduced on the planned mesh
@@ -55,8 +57,8 @@ class Plan:
     h: float | None = None
     highest: float = 0.0
     statement: Statement = field(default_factory=Statement)
-    seconds: float = 0.1
-    memory: float = 1e8
+    seconds: float | None = None
+    memory: float | None = None
     rows: tuple[PlanRow, ...] = ()
     cautions: tuple[str, ...] = ()
     prepared: ReducedBody | None = field(default=None, repr=False)

@@ -101,6 +101,10 @@ def refine(
     while True:
         prepared, values = solve(size)
         same = coarse.effort.dofs == prepared.effort.dofs
+        if same:  # the cost of the first
+            prepared = replace(
+                prepared, effort=replace(prepared.effort, seconds=coarse.effort.seconds)
+            )
         error = mesh_error(body, (before, size), (other, values), same=same)
         if h or not tolerance < error < np.inf or size == sizes[-1]:
             return Refined(h=size, error=error, compared=before, prepared=prepared)

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from simple_model import Effort
 from simple_model.numbers import EN_DASH, change_text, percent, significant
 from skinwave.bodies.sheet import air_mass
 from skinwave.bodies.sizes import AT, coat, layer_name, thicknesses
+from skinwave.models import Cost
 from skinwave.models.meshed import axes_of_probes, mirrored_axes
 from skinwave.models.reduced import BAND, reduction_tolerance
 from skinwave.planning.left_out import mean_sag
@@ -21,7 +23,6 @@ def element_rows(
 ) -> list[PlanRow]:
     """Return the rows of elements for symmetry `axes`, a `highest` line in Hz and a given h."""
     effort = mesh.prepared.effort
-    cached = "" if "factorise and reduce" in effort.seconds else " (read from the cache)"
     return [
         _symmetry_row(scene, axes),
         _size_row(mesh, tolerance, h),
@@ -33,12 +34,23 @@ def element_rows(
             "little",
         ),
         *neglected_rows(scene, highest),
-        PlanRow(
-            what="cost",
-            value=f"{sum(effort.seconds.values()):.1f} s, {effort.peak_memory / 2**30:.1f} GiB",
-            reason=f"for the last mesh{cached}; each further Tacton on this body takes 0.05 s",
-        ),
     ]
+
+
+def cost_row(cost: Cost, effort: Effort | None) -> PlanRow:
+    """Return the row of the cost of a response, with the effort of the body if it is reduced."""
+    reason = "predicted for the first response, to within a factor of 2"
+    if effort:
+        spent = sum(effort.seconds.values())
+        cached = "" if "factorise and reduce" in effort.seconds else " (read from the cache)"
+        reason = (
+            f"for the last mesh{cached}; each further Tacton on this body takes "
+            f"{significant(cost.seconds - spent, 1)} s"
+        )
+    if cost.cure:
+        reason += f"; to shorten it, {cost.cure}"
+    value = f"{significant(cost.seconds, 2)} s, {cost.memory / 2**30:.1f} GiB"
+    return PlanRow(what="cost", value=value, reason=reason)
 
 
 def _symmetry_row(scene: Scene, axes: str) -> PlanRow:

@@ -20,7 +20,7 @@ from skinwave.planning.plan_warnings import stated
 from skinwave.planning.record import Plan
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning, versions
-from skinwave.system.progress_bar import progress_callback
+from skinwave.system.progress_bar import expecting, progress_callback
 
 
 def simulate(
@@ -79,7 +79,9 @@ def solve(scene: Scene, planned: Plan) -> Response:
         times, first = sample_grid(scene, options.times)
         whole = answer(planned.prepared, scene, options.progress, times=times)
         return _check(scene, planned, from_first(whole, first))
-    return _check(scene, planned, _solve_by_model(replace(scene, body=planned.body), options))
+    with expecting(options.progress, planned.seconds):
+        response = _solve_by_model(replace(scene, body=planned.body), options)
+    return _check(scene, planned, response)
 
 
 def compute(scene: Scene, model: str, **options: Any) -> Response:

@@ -78,6 +78,8 @@ def _label(material: object) -> str:
 
 
 def _cost(plan: "Plan") -> str:
+    if plan.seconds is None or plan.memory is None:
+        return "cost unknown"
     return f"{plan.seconds:.2g} s, {plan.memory / 2**30:.2g} GiB"
 
 

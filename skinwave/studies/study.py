@@ -53,7 +53,6 @@ COMPLETENESS = (
     "flat-body-harmonic", "flat-body", "plate-modes-transient", "fem", "plate-modes-nonlinear",
 )  # fmt: skip
 LIVE = "live.html"
-SLOW = 3.0  # s: responses of slower models come last
 ABOUT = (
     "The point-kernel model of Lim, Seifi and Park (CHI EA '24, doi 10.1145/3613905.3650981) is "
     "run as published and under the load of the bodies. Amplitudes of all lines are in lines.csv, "
@@ -252,7 +251,9 @@ def _runs(
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
     reduced = {column for column, model in models.items() if named(model).is_reduced}
     # Bodies are reduced here while workers compute slow responses.
-    every.sort(key=lambda each: 1 if each[1] in reduced else 2 * _is_slow(models[each[1]]))
+    every.sort(
+        key=lambda each: 1 if each[1] in reduced else 2 * named(models[each[1]]).is_nonlinear
+    )
     several = len(scenes) > 1
     sizes = paper15.SIZES if several else {}
     size_of = {column: replace(options, h=options.h or sizes.get(column)) for column in reduced}
@@ -315,10 +316,6 @@ def _runs(
         with or_failed(failures, f"flat slab beside {column}"):
             if run := slab.result():
                 found.checks[column] = run
-
-
-def _is_slow(model: str) -> bool:
-    return named(model).seconds > SLOW
 
 
 def _report(progress: Progress, column: str, phase: str, fraction: float) -> None:

@@ -1,14 +1,40 @@
 """Progress on standard error: the steps of preparing a body, and a bar."""
 
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
 
 from skinwave.system.effort import Progress, silent
 from skinwave.system.plain_text import printable, say
 
 # Steps in their order, each with its share of the time: between those of a sheet and of a palm.
 STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.20, "reduce": 0.70}
+
+
+@dataclass(frozen=True)
+class _Bar:
+    """Progress callback of a bar, and the function that tells it the seconds of the next phase."""
+
+    show: Progress
+    expect: Callable[[float], None]
+
+    def __call__(self, phase: str, fraction: float) -> None:
+        self.show(phase, fraction)
+
+
+@contextmanager
+def expecting(progress: Progress, seconds: float | None) -> Iterator[None]:
+    """Tell a bar the predicted seconds of what is done within, if known.
+
+    It counts down from them until a fraction above 0 is reported.
+    """
+    expect = progress.expect if isinstance(progress, _Bar) else lambda seconds: None
+    expect(seconds or 0.0)
+    yield
+    expect(0.0)
 
 
 def step_of(phase: str, fraction: float) -> tuple[str, float]:
@@ -38,7 +64,7 @@ def progress_callback(progress: Progress | bool | None) -> Iterator[Progress]:
 @contextmanager
 def bar() -> Iterator[Progress]:
     """Yield a callback that shows a bar on a terminal, and otherwise a line for each step."""
-    last = ("", 0.0)
+    last, started, expected = ("", 0.0), 0.0, 0.0
     if not sys.stderr.isatty():
 
         def log(phase: str, fraction: float) -> None:
@@ -52,22 +78,45 @@ def bar() -> Iterator[Progress]:
         return
     from rich import progress as rich
     from rich.console import Console
+    from rich.progress_bar import ProgressBar
+    from rich.text import Text
 
-    columns = (
-        rich.TextColumn("{task.description:<36}", markup=False),
-        rich.BarColumn(),
-        rich.TimeElapsedColumn(),
-        rich.TimeRemainingColumn(),
-    )
+    class Fill(rich.BarColumn):
+        """Completed share: by the expected seconds of phases that report none."""
+
+        def render(self, task: rich.Task) -> ProgressBar:
+            filled = super().render(task)
+            if expected:
+                filled.completed = min((time.monotonic() - started) / expected, 1.0)
+            return filled
+
+    class Remaining(rich.TimeRemainingColumn):
+        """Remaining time, likewise."""
+
+        max_refresh = 0.0  # s
+
+        def render(self, task: rich.Task) -> Text:
+            if not expected:
+                return super().render(task)
+            left = max(0, round(started + expected - time.monotonic()))
+            return Text(str(timedelta(seconds=left)), style="progress.remaining")
+
+    text = rich.TextColumn("{task.description:<36}", markup=False)
+    columns = text, Fill(), rich.TimeElapsedColumn(), Remaining()
     with rich.Progress(*columns, console=Console(stderr=True)) as shown:
         task = shown.add_task("", total=1.0)
 
+        def expect(seconds: float) -> None:
+            nonlocal started, expected
+            started, expected = time.monotonic(), seconds
+
         def show(phase: str, fraction: float) -> None:
-            nonlocal last
+            nonlocal last, expected
             step = step_of(phase, fraction)
+            expected = 0.0 if fraction > 0 else expected
             if step[1] < last[1]:  # the next body, or a phase after the steps
                 shown.reset(task)
             shown.update(task, description=printable(step[0], ""), completed=step[1])
             last = step
 
-        yield show
+        yield _Bar(show, expect)

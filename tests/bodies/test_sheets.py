@@ -227,7 +227,7 @@ def test_models_refuse_sheets_that_they_do_not_cover():
     assert limit.cure == "set air = false"
     assert not refused("plate-modes", replace(two, air="free"))
     assert not refused("fem", replace(two, air="free"))
-    with pytest.raises(ValueError, match="hold all edges, or use air = \"free\""):
+    with pytest.raises(ValueError, match='hold all edges, or use air = "free"'):
         replace(two, air="baffle")
     lossy = replace(two, mounting=replace(TWO, edge_loss=0.01))
     assert [limit.cure for limit in refused("fem", lossy)] == ["set edge_loss = 0"]

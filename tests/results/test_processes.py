@@ -2,11 +2,13 @@
 
 import io
 import os
+import re
 import signal
 import subprocess
 import sys
 import threading
 from argparse import Namespace
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,7 @@ from skinwave.commands.cli import main
 from skinwave.system.effort import one_thread
 from skinwave.system.plain_text import cell, csv_table, printable, say
 from skinwave.system.processes import environment, pool
+from skinwave.system.progress_bar import expecting
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 HOSTILE = "a\x1b[2Jb\x07c\x9bd\x7fe\u202ef\u2066g\x00h\ud800i"
@@ -140,6 +143,20 @@ def test_the_progress_bar_escapes_markup(monkeypatch):
         progress(f"{name}\x1b[2J", 0.5)
     assert name in drawn.getvalue()
     assert "\x1b[2J" not in drawn.getvalue()
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.5])
+def test_the_bar_counts_down_from_the_predicted_seconds_until_it_knows_better(
+    fraction, monkeypatch
+):
+    console = Console(file=(drawn := io.StringIO()), force_terminal=True, width=120)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("rich.console.Console", lambda **asked: console)
+    with ExitStack() as phases, common.progress_of(Namespace(quiet=False, json=False)) as progress:
+        phases.enter_context(expecting(progress, 36_000))
+        progress("lines", fraction)
+    last = drawn.getvalue().rpartition("lines")[2]
+    assert bool(re.search(r"9:59:5\d|10:00:00", last)) == (fraction == 0.0)
 
 
 def test_text_that_a_spreadsheet_would_compute_is_marked():
