@@ -13,7 +13,7 @@ writes the nearest sheets as scene files. To run one with a drive law of this mo
 
     PYTHONPATH=examples SKINWAVE_EXTENSIONS=which_sheet skinwave run which-sheet/sheet-1.toml
 
-A candidate is a linear plate in air, in the steady state. A large sag would make it stiffer.
+A candidate is a linear plate in open air, in the steady state. A large sag would make it stiffer.
 """
 
 import argparse
@@ -118,7 +118,7 @@ def scene_of(candidate: Row) -> Scene:
         "body": {
             "kind": "sheet", "size_x_mm": x, "size_y_mm": y,
             "thickness_mm": candidate["grammage_g_m2"] / DENSITY,
-            "sides": "clamped", "air": True, "mounting": _mounting(candidate, x, y),
+            "sides": "clamped", "air": "free", "mounting": _mounting(candidate, x, y),
             "material": {
                 "density_kg_m3": DENSITY, "young_x_pa": young_x,
                 "young_y_pa": young_x * candidate["young_ratio"], "poisson_xy": POISSON,

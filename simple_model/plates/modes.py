@@ -24,6 +24,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg, sparse
+from scipy.linalg.lapack import zgetrf, zgetrs
 
 from simple_model.choices import check_numbers, choose
 from simple_model.layers.compliance import AIR_DENSITY
@@ -42,8 +43,8 @@ SHIFT = 1e-12  # of the mean squared frequency
 MOST_DOFS = 6000  # of one symmetry, for some minutes
 TIE = 1e-9  # of the mass, for sound: equal frequencies have one mode that radiates, others do not
 COUPLED = 1.3  # of the frequency of a line: modes below 1 / 1.3 or above 1.3 are almost uncoupled
-RESIDUAL = 1e-11  # of the largest force, of the solution for coupled modes
-SWEEPS = 25  # that a line may need
+RESIDUAL = 1e-10  # of the largest force, of the solution for coupled modes
+SWEEPS = 30  # that a line may need
 LINES_AT_ONCE = 64
 
 
@@ -316,8 +317,9 @@ class _Coupled:
         return np.asarray(block)
 
     def solve(self, forces: Complex) -> Complex:
-        """Coordinates (f, m) under forces (f, m), iterated with modes near a line solved together
-        and all others alone.
+        """Coordinates (f, m) under forces (f, m), by conjugate gradients for complex symmetric
+        matrices (van der Vorst and Melissen, IEEE Trans Magn 26:706 (1990)). The preconditioner
+        solves modes near a line together and all others alone.
         """
         low, high = (
             np.searchsorted(self.squared, (self.w * factor) ** 2)
@@ -325,9 +327,7 @@ class _Coupled:
         )
         near = [slice(*each) for each in zip(low.tolist(), high.tolist(), strict=True)]
         factors = [
-            linalg.lu_factor(self.block(k, modes), check_finite=False)
-            if modes.stop > modes.start
-            else None
+            zgetrf(self.block(k, modes))[:2] if modes.stop > modes.start else None
             for k, modes in enumerate(near)
         ]
 
@@ -335,17 +335,25 @@ class _Coupled:
             q = left / self.own
             for k, (modes, factor) in enumerate(zip(near, factors, strict=True)):
                 if factor is not None:
-                    q[k, modes] = linalg.lu_solve(factor, left[k, modes], check_finite=False)
+                    q[k, modes] = zgetrs(*factor, left[k, modes])[0]
             return np.asarray(q)
 
         allowed = RESIDUAL * np.abs(forces).max(axis=1)
-        q = together(forces)
+        q, left = np.zeros_like(self.own), forces.astype(np.complex128)
+        toward = along = together(left)
+        size = (left * toward).sum(axis=1)
         for _ in range(SWEEPS):
-            left = forces - self.own * q - self.between(q)
+            image = self.own * along + self.between(along)
+            with np.errstate(divide="ignore", invalid="ignore"):  # of lines that are solved
+                step = np.nan_to_num(size / (along * image).sum(axis=1))[:, None]
+            q, left = q + step * along, left - step * image
             open_lines = ~(np.abs(left).max(axis=1) <= allowed)
             if not open_lines.any():
                 return q
-            q = q + together(left)
+            toward, before = together(left), size
+            size = (left * toward).sum(axis=1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                along = toward + np.nan_to_num(size / before)[:, None] * along
         for k in np.flatnonzero(open_lines).tolist():
             q[k] = np.linalg.solve(self.block(k, slice(None)), forces[k])
         return q
