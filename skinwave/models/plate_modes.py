@@ -37,6 +37,7 @@ from simple_model.plates.modes import (
 )
 from simple_model.plates.von_karman import KarmanPlate, karman_plate
 from skinwave.bodies.body import Body
+from skinwave.bodies.sheet import equivalent
 from skinwave.bodies.supports import EDGES
 from skinwave.models import Cost, Limit, Model, named, register
 from skinwave.models.costs import (
@@ -179,6 +180,17 @@ def thin_plate_part(scene: Scene) -> ErrorPart:
     return without_shear(scene, error)
 
 
+def thick_mesh_part(scene: Scene) -> Iterator[ErrorPart]:
+    """Yield the part due to shear and rotary inertia of a mesh that is thicker than its sheet."""
+    if not takes(FROM_REST, scene):
+        return
+    error = CLAMPED * effect_of(_thick_mesh, scene, len(sample_times(scene)))
+    source = f"the mesh, {1e3 * equivalent(scene.body):.2g} mm thick for the same bending"
+    yield ErrorPart(
+        name="thick mesh", source=source, error=error, cure=f"use --model {FROM_REST.name}"
+    )
+
+
 def without_shear(scene: Scene, error: float) -> ErrorPart:
     """Return the part of the error of a thin plate."""
     cure = "use --model fem" if takes(named("fem"), scene) else "use a thinner sheet"
@@ -211,9 +223,17 @@ def effect_of(change: Callable[[Body, PlateModes], Factors], scene: Scene, sampl
 
 
 def _shear_and_inertia(body: Body, modes: PlateModes) -> Factors:
+    return _of_thickness(body, modes, body.depth)
+
+
+def _thick_mesh(body: Body, modes: PlateModes) -> Factors:
+    return _of_thickness(body, modes, max(body.depth, equivalent(body)))
+
+
+def _of_thickness(body: Body, modes: PlateModes, thickness: float) -> Factors:
     bent = np.maximum(modes.squared * modes.elastic, 0.0)
     k = np.asarray((bent * body.mass_per_area / body.bending_stiffness) ** 0.25)
-    return thick_plate(k * body.depth, body.solid.poisson)
+    return thick_plate(k * thickness, body.solid.poisson)
 
 
 def _detuned(body: Body, modes: PlateModes) -> Factors:

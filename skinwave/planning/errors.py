@@ -12,7 +12,7 @@ from skinwave.models import Model
 from skinwave.models.laws import own_laws, series_tolerance
 from skinwave.models.limits import takes
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.plate_modes import STRETCHED
+from skinwave.models.plate_modes import STRETCHED, thick_mesh_part
 from skinwave.models.reduced import BAND, ReducedBody
 from skinwave.planning.estimates import spot_scale
 from skinwave.planning.left_out import series_error, stretching_error
@@ -73,6 +73,7 @@ def element_parts(
         ErrorPart(name="absorbing layer", source="the absorbing layer", error=absorbing,
                   cure="use a larger body"),
         band_part(scene, BAND, above_band),
+        *thick_mesh_part(scene),
     ]  # fmt: skip
 
 
