@@ -220,9 +220,9 @@ def _sheet(draw: random.Random) -> Table:
         "size_y_mm": round(draw.uniform(15, 40), 1),
         "thickness_mm": round(draw.uniform(0.08, 0.3), 3),
         "material": material,
-        "air": draw.random() < 0.4,
     }
     mounting: Table = {}
+    of_air = draw.random()
     if draw.random() < 0.5:
         sides = [["left", "right"], ["front", "back"], ["front"], ["left", "front"]]
         mounting["edges"] = draw.choice(sides)
@@ -233,6 +233,8 @@ def _sheet(draw: random.Random) -> Table:
             mounting[f"tension_{axis}_n_per_m"] = round(draw.uniform(0, 50), 1)
     if mounting:
         keys["mounting"] = mounting
+    if of_air < 0.4:
+        keys["air"] = "free" if of_air < 0.2 or "edges" in mounting else "baffle"
     return keys
 
 
