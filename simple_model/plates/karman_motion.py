@@ -89,7 +89,7 @@ class ModesFromRest:
     start: Complex
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=3)
 def modes_from_rest(
     modes: PlateModes, pressure: MovingPressure, material: Material, middle: tuple[float, float],
     highest: float = np.inf,
