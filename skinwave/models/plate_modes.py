@@ -419,7 +419,8 @@ def stretched(
     steps, fewer = base, ceil(base / 2)
     while (left := by_steps(first, steps, fewer)) > allowed / 2 and steps < finest:
         ratio = max(LEAST_RATIO, sqrt(left / (allowed / 2)))
-        steps, fewer = min(ceil(ratio * steps), finest), steps
+        shorter = min(ceil(ratio * steps), finest)
+        steps, fewer = shorter, min(steps, int(shorter / LEAST_RATIO))
     for less, count in pairwise(counts):
         by_modes = TRUNCATION * change(Run(count=count, steps=base), Run(count=less, steps=base))
         if by_modes + left <= allowed:
@@ -432,10 +433,10 @@ def stretched(
         (-weight, Run(count=same, steps=fewer)),
     )  # fmt: skip
     dt = times[-1] / steps
-    shorter = f"{dt / 2:.7f}".rstrip("0")
+    half = f"{dt / 2:.7f}".rstrip("0")
     part = steps_part(
         f"{count} modes that stretch, in steps of {1e3 * dt:.3g} ms",
-        by_modes + left, f", or skinwave run --dt {shorter}",
+        by_modes + left, f", or skinwave run --dt {half}",
     )  # fmt: skip
     added = np.asarray(sum(weight * values(run) for weight, run in runs))
     return Stretching(linear=linear, values=added, runs=runs, error=part)
