@@ -1,4 +1,5 @@
-"""Errors and costs of plans on random scenes: `python -m bench.plans stated|cost [N] [SEED]`.
+"""Errors and costs of plans: `python -m bench.plans stated|cost [N] [SEED]` on random scenes, and
+`python -m bench.plans sheets` on sheets that stretch.
 
 `stated`: the error that the plan of `fem` states, on scenes of `bench.agreement` with small solid
 bodies without absorbing sides, and the true error, by elements of half the size on the planned
@@ -7,12 +8,19 @@ body. A scene fails if its true error is more than 1.1 times the stated one.
 `cost`: the error of the planned response against fine elements (0.7 of the default size, absorbing
 sides twice as far away), and its time over that of the cheapest candidate within the tolerance,
 which is not known beforehand, without and with the time of planning.
+
+`sheets`: the time of the lines of the load; the times of the rest of a plan, of the response and of
+its map, over that of one run with the fewest modes in the longest steps; and the error of steps and
+modes, stated and true. The reference has 170 modes. It extrapolates from steps of a half and a
+quarter of the longest with 120 modes.
 """
 
 import os
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import count
 
 import numpy as np
@@ -22,14 +30,17 @@ from fem import Material
 from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.layers.material import from_young
 from skinwave.bodies.sizes import default_size
-from skinwave.models.options import SolveOptions
+from skinwave.models import plate_modes
+from skinwave.models.options import SolveOptions, sample_times
+from skinwave.models.plate_modes import COUNTS, STRETCHED, Run, sheet_motion
 from skinwave.models.reduced import answer, prepare
 from skinwave.models.relative_change import relative_changes
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import about_its_rest
 from skinwave.planning.simulate import compute
-from skinwave.scene.file import from_table
+from skinwave.scene.file import from_table, loads
 from skinwave.scene.scene import Body, Scene
+from skinwave.typing import Floats
 
 MOST = 1.1  # times the stated error
 LARGEST = 8000  # degrees of freedom: above, the reference takes minutes
@@ -38,6 +49,27 @@ FINEST = 0.7  # of the default element size
 COARSER = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
 TOLERANCES = (0.03, 0.05, 0.10, 0.20)
 SCENES = 20
+MOST_MODES = 120, 170  # of references of sheets, in the shortest and in the longest steps
+AM = "am_frequency_hz = 140\nduration_s = 0.5"
+CIRCLE = "shape = 'circle'\nsize_mm = 20\nspeed_m_per_s = 12"
+SHEETS = {  # Tacton and body
+    "paper sheet, AM 140 Hz": (f"{AM}\n{CIRCLE}", "preset = 'paper-sheet'"),
+    "its mode of 71 Hz": ("am_frequency_hz = 71\nduration_s = 0.5", "preset = 'paper-sheet'"),
+    "twice the pressure": (
+        f"{AM}\n{CIRCLE}\n[focus]\npeak_pressure_pa = 100",
+        "preset = 'paper-sheet'",
+    ),
+    "loose sheet": (f"{AM}\n{CIRCLE}", "preset = 'paper-sheet-loose'"),
+    "A5 with tension, 0.3 s": (
+        f"am_frequency_hz = 140\nduration_s = 0.3\n{CIRCLE}",
+        "preset = 'a5-sheet'\n[body.mounting]\ntension_x_n_per_m = 49\ntension_y_n_per_m = 15",
+    ),
+    "two foci with a rhythm, 0.4 s": (
+        f"duration_s = 0.4\n{CIRCLE}\nfoci = [0.0, 0.5]\n[tacton.rhythm]\n"
+        "pulses_ms = [[100, 50], [40, 110]]",
+        "preset = 'paper-sheet'",
+    ),
+}  # fmt: skip
 
 
 def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> tuple[float, float]:
@@ -184,8 +216,51 @@ def cost(number: int, first: int) -> None:
           f"the cheapest, {counts[2]} with planning")  # fmt: skip
 
 
+def seconds_of(call: Callable[..., object], *arguments: object) -> float:
+    """Return the time of a call in seconds."""
+    started = time.perf_counter()
+    call(*arguments)
+    return time.perf_counter() - started
+
+
+def _added(drawn: Scene, count: int, steps: int) -> Floats:
+    """Return what stretching adds to a response (t, p), with modes and steps as in `Run`."""
+    run = Run(count=count, steps=steps)
+    return plate_modes.added_by_stretching(drawn, sample_times(drawn), run)
+
+
+def assess_sheets() -> None:
+    """Print a table of sheets that stretch."""
+    print(f"{'scene':<31}  lines  one run   plan  response  map   stated    true")
+    for name, (tacton, body) in SHEETS.items():
+        drawn = loads(f"[tacton]\n{tacton}\n[body]\n{body}")
+        times = sample_times(drawn)
+        steps = len(times) - 1
+        added = partial(_added, drawn)
+        lines = seconds_of(plate_modes.steady_lines, drawn)
+        planning = seconds_of(plan, drawn, SolveOptions())
+        one = seconds_of(added, COUNTS[0], steps - 1)  # the plate is known from the plan
+        answered = seconds_of(compute, drawn, STRETCHED.name)
+        mapped = seconds_of(sheet_motion, drawn, SolveOptions().tolerance)
+        found = plate_modes.stretched(
+            drawn, len(times), float(times[1]), SolveOptions().tolerance, None
+        )
+        fine, coarse = (added(MOST_MODES[0], n * steps) for n in (4, 2))
+        true = fine + (fine - coarse) / 3 + added(MOST_MODES[1], steps)
+        true -= added(MOST_MODES[0], steps)
+        wrong = float(relative_changes(found.values - true, found.linear + true).max())
+        print(
+            f"{name:<31}{lines:5.1f} s{one:7.2f} s{planning / one:7.1f}{answered / one:9.1f}"
+            f"{mapped / one:6.1f}{100 * found.error.error:7.2f} %{100 * wrong:6.2f} %",
+            flush=True,
+        )
+
+
 if __name__ == "__main__":
     os.environ["SKINWAVE_CACHE"] = ""
+    if sys.argv[1] == "sheets":
+        assess_sheets()
+        sys.exit()
     table_name, *numbers = sys.argv[1:]
     number, seed = (*map(int, numbers), *(SCENES, 0)[len(numbers) :])
     {"stated": check_stated_errors, "cost": cost}[table_name](number, seed)

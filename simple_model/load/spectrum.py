@@ -37,6 +37,7 @@ PHASES = 8  # of each sinusoid, at least
 MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all
 ALIASED = 1e-4  # of the strongest: largest harmonic of a drive law beyond those sampled
 MANY_LINES, RAISED_POWER = 20, 8  # lines of a jump; power of frequency that raises the last
+PRODUCTS = 2**22  # of amplitudes and exponentials at a time
 EQUAL_STEPS = 1e-9  # relative difference of steps between equally spaced times
 LINES_AT_ONCE = 2**24  # times points, some hundred megabytes
 
@@ -190,13 +191,16 @@ def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Float
     block = int(np.ceil(np.sqrt(len(times)))) if equal else max(1, len(times))
     # Exponentials are products of those within the first block of times and at the start of each.
     within = np.exp(2j * np.pi * np.outer(times[:block] - times[:1], frequencies))
-    values = np.empty((len(times), *amplitudes.shape[1:]))
-    for first in range(0, len(times), block):
-        part = values[first : first + block]
-        turned = amplitudes * np.exp(2j * np.pi * frequencies * times[first])[:, None]
-        turn = within[: len(part)]
-        part[:] = turn.real @ turned.real - turn.imag @ turned.imag
-    return values
+    starts = np.exp(2j * np.pi * np.outer(frequencies, times[::block]))
+    real, imag, p = within.real.copy(), within.imag.copy(), amplitudes.shape[1]
+    values, some = [], max(1, PRODUCTS // max(1, amplitudes.size))
+    for first in range(0, max(1, starts.shape[1]), some):
+        turned = starts[:, first : first + some, None] * amplitudes[:, None]
+        together = turned.reshape(len(frequencies), turned.shape[1] * p)
+        summed = real @ together.real - imag @ together.imag
+        shape = len(within), turned.shape[1], p
+        values.append(summed.reshape(shape).swapaxes(0, 1).reshape(shape[0] * shape[1], p))
+    return np.concatenate(values)[: len(times)]
 
 
 def merge_lines(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:

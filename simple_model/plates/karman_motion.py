@@ -67,7 +67,8 @@ def linear_motion(
     """
     x, y = middle
     driven = modes_from_rest(modes, pressure, material, (x, y), driving)
-    chosen, few = slice(None) if chosen is None else chosen, driven.frequencies < highest
+    chosen = np.arange(len(modes.squared)) if chosen is None else chosen
+    few = driven.frequencies < highest
     coordinates = synthesise(driven.frequencies[few], driven.motion[few][:, chosen], times)
     for poles, amplitudes in zip(driven.poles[chosen].T, driven.start[chosen].T, strict=True):
         moving = amplitudes != 0
@@ -90,7 +91,7 @@ class ModesFromRest:
     start: Complex
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=3)
 def modes_from_rest(
     modes: PlateModes, pressure: MovingPressure, material: Material, middle: tuple[float, float],
     highest: float = np.inf,

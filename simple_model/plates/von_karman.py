@@ -136,7 +136,8 @@ def karman_plate(
         damping=modes.damping[chosen],
         H=np.concatenate([slopes.stiffness(turn, states) for turn, states in strong]),
         symmetries=(
-            slopes.symmetries, np.repeat(*zip(*((t, s.shape[-1]) for t, s in strong), strict=True)),
+            slopes.symmetries,
+            np.concatenate([np.full(states.shape[-1], turn) for turn, states in strong]),
         ),
         left_out=float(np.sqrt(energy[energy <= least].sum() / energy.sum())),
     )  # fmt: skip

@@ -375,7 +375,7 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
     started = time.perf_counter()
     modes: PlateModes = modes_of(plate_of(scene.body))
     options.progress("large deflection", 0.0)
-    found = _stretch(scene, len(times), step(times), options.tolerance, options.dt)
+    found = stretched(scene, len(times), step(times), options.tolerance, options.dt)
     used = found.runs[0][1]
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
@@ -397,7 +397,9 @@ def first_part(scene: Scene, times: Floats) -> Floats:
 def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
     """Return the largest relative error of a linear response (t, p) from rest."""
     count = min(COUNTS[0], len(modes_of(plate_of(scene.body)).squared))
-    stretching = _stretching(scene, times, Run(count=count, steps=_step_count(times, LONGEST)))
+    stretching = added_by_stretching(
+        scene, times, Run(count=count, steps=_step_count(times, LONGEST))
+    )
     return float(relative_changes(stretching, linear + stretching).max())
 
 
@@ -408,7 +410,7 @@ def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Callab
     """
     times, body, pressure = sample_times(scene), scene.body, scene.pressure
     middle, modes = body.placement.offset, modes_of(plate_of(body))
-    found, driven = _stretch(scene, len(times), step(times), tolerance, None), _drive(scene, times)
+    found, driven = stretched(scene, len(times), step(times), tolerance, None), _drive(scene, times)
     driving = highest_driving(pressure, times)
     stretching = [
         (weight, *_coordinates(pressure, body, float(times[-1]), run, driving))
@@ -446,7 +448,7 @@ class Stretching:
 
 
 @lru_cache(maxsize=1)  # a response and a map of the same motion
-def _stretch(
+def stretched(
     scene: Scene, samples: int, sample: float, tolerance: float, dt: float | None
 ) -> Stretching:  # fmt: skip
     """Return what stretching adds at every `sample` in s, within the tolerance if possible.
@@ -461,7 +463,7 @@ def _stretch(
     counts = [min(count, most) for count in COUNTS]
     first, base = counts[0], _step_count(times, dt or LONGEST)
     finest = base if dt else max(base, _step_count(times, SHORTEST))
-    values = lru_cache(partial(_stretching, scene, times))
+    values = lru_cache(partial(added_by_stretching, scene, times))
 
     def change(run: Run, other: Run) -> float:
         found = values(run)
@@ -475,7 +477,8 @@ def _stretch(
     steps, fewer = base, ceil(base / 2)
     while (left := by_steps(first, steps, fewer)) > allowed / 2 and steps < finest:
         ratio = max(LEAST_RATIO, sqrt(left / (allowed / 2)))
-        steps, fewer = min(ceil(ratio * steps), finest), steps
+        shorter = min(ceil(ratio * steps), finest)
+        steps, fewer = shorter, min(steps, int(shorter / LEAST_RATIO))
     for less, count in pairwise(counts):
         by_modes = TRUNCATION * change(Run(count=count, steps=base), Run(count=less, steps=base))
         if by_modes + left <= allowed:
@@ -488,10 +491,10 @@ def _stretch(
         (-weight, Run(count=same, steps=fewer)),
     )  # fmt: skip
     dt = times[-1] / steps
-    shorter = f"{dt / 2:.7f}".rstrip("0")
+    half = f"{dt / 2:.7f}".rstrip("0")
     part = steps_part(
         f"{count} modes that stretch, in steps of {1e3 * dt:.3g} ms",
-        by_modes + left, f", or skinwave run --dt {shorter}",
+        by_modes + left, f", or skinwave run --dt {half}",
     )  # fmt: skip
     added = np.asarray(sum(weight * values(run) for weight, run in runs))
     return Stretching(linear=linear, values=added, runs=runs, error=part)
@@ -518,7 +521,7 @@ def _planned_parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
     yield steps_part("modes that stretch, in time steps", SHARE * options.tolerance)
 
 
-def _stretching(scene: Scene, times: Floats, run: Run) -> Floats:
+def added_by_stretching(scene: Scene, times: Floats, run: Run) -> Floats:
     """Return what stretching adds to the quantity (t, p)."""
     driving = highest_driving(scene.pressure, times)
     plate, coordinates = _coordinates(scene.pressure, scene.body, float(times[-1]), run, driving)
