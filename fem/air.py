@@ -54,7 +54,7 @@ def air_around(
     free: Ints,
     density: float,
     *,
-    baffle: bool = True,
+    frame: float = np.inf,
     axes: Floats = FLAT,
     mirrored: str = "",
     facets: str | Ints = "top",
@@ -66,7 +66,7 @@ def air_around(
     mesh : TetMesh of a rectangle in equal cells
     free : (n,) int, free degrees of freedom
     density : density of the fluid, kg/m3
-    baffle : whether a rigid wall around the sheet separates the air on both sides
+    frame : m, width of a rigid frame around the sheet, inf for a baffle
     axes : (2, 3) unit vectors along the sides of the rectangle
     mirrored : "x", "y" or "xy" if only the positive half along these axes is meshed. The other
         half moves as the mirror image; the result is that of the meshed part.
@@ -95,14 +95,17 @@ def air_around(
         for spacing, count, image in zip((dx, dy), shape[::-1], images, strict=True)
     )
     whole = 2.0 ** sum(images)  # times an integral over the meshed part
-    if baffle:
+    if frame == np.inf:
         pressure = _pressure_in_baffle(shape, (dy, dx), images[::-1], density)
         moments = {"monopole": [np.ones((len(y), len(x)))], "dipole": []}
         moments["dipole"] += [] if images[0] else [np.tile(x, (len(y), 1))]
         moments["dipole"] += [] if images[1] else [np.tile(y[:, None], (1, len(x)))]
         rates = {"monopole": density / np.pi / C, "dipole": density / (3 * np.pi * C**3)}
     else:
-        sizes = [float(np.ptp(at)) * (1 + image) for at, image in zip((x, y), images, strict=True)]
+        sizes = [
+            float(np.ptp(at)) * (1 + image) + 2 * frame
+            for at, image in zip((x, y), images, strict=True)
+        ]
         orders = [
             np.arange(0, int(np.ceil(FINEST * size / 2)) + SPARE, 1 + image)
             for size, image in zip(sizes, images, strict=True)

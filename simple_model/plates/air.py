@@ -3,9 +3,10 @@ friction that damp the plate.
 
 For bending waves much slower than sound the air is incompressible. In a baffle its mass per area at
 a wavenumber k is 2 rho / k (Junger and Feit, Sound, Structures, and Their Interaction (1986),
-5.11). In open air the difference p of the pressures on both sides is zero beyond the plate and
+5.11). In open air the difference p of the pressures on both sides is zero beyond the plate and its
+frame, and
 
-    k p(k) / 2 rho = transform of an acceleration that is given on the plate.
+    k p(k) / 2 rho = transform of an acceleration that is given on the plate, and 0 on the frame.
 
 Galerkin's method finds p in the functions sqrt(1 - s^2) U_n(s), with Chebyshev's polynomials U_n of
 the second kind. With
@@ -104,15 +105,17 @@ class AirLoss:
 
 
 def air_of(
-    x: LineBasis, y: LineBasis, density: float, *, baffle: bool
+    x: LineBasis, y: LineBasis, density: float, frame: float = np.inf
 ) -> tuple[Floats, Floats, Ints]:
     """Added mass (x y, x y) in kg/m2, y fastest, of products of functions, and their `patterns` and
-    `orders` for `AirLoss`; density in kg/m3.
+    `orders` for `AirLoss`; density in kg/m3, width of a rigid frame around the plate in m, inf for
+    a baffle.
     """
-    if not baffle:
-        couplings = [_edge_coupling(line) for line in (x, y)]
+    if frame < np.inf:
+        couplings = [_edge_coupling(line, frame) for line in (x, y)]
         orders = [np.flatnonzero(np.abs(each).max(axis=1) > ZERO) for each in couplings]
-        inverse, whole = open_air((x.length, y.length), orders, density)
+        sizes = [line.length + 2 * frame for line in (x, y)]
+        inverse, whole = open_air(sizes, orders, density)
         of_x, of_y = (each[n] for each, n in zip(couplings, orders, strict=True))
         pairs = inverse.reshape(len(of_x), len(of_y), len(of_x), len(of_y))
         mass = np.einsum("abcd,ai,bj,ck,dl->ijkl", pairs, of_x, of_y, of_x, of_y, optimize=True)
@@ -175,17 +178,16 @@ def edge_functions(orders: Ints, length: float, x: Floats) -> Floats:
     return np.asarray(np.sin(np.multiply.outer(angle, orders + 1)))
 
 
-def _edge_coupling(line: LineBasis) -> Floats:
-    """Integrals (n, i) of the edge functions of a line with its functions, by Gauss's rule with the
-    weight sqrt(1 - s^2).
-    """
-    count = line.legendre.shape[1]
-    pieces = len(line.breaks) - 1  # with jumps of a derivative between them
-    nodes = (2 if pieces == 1 else 16 * pieces) * count
-    angle = np.arange(1, nodes + 1) * pi / (nodes + 1)
-    weighted = np.sin(np.multiply.outer(np.arange(1, count + 1), angle)) * np.sin(angle)
-    values = line(line.length / 2 * np.cos(angle))
-    return np.asarray(line.length / 2 * pi / (nodes + 1) * weighted @ values)
+def _edge_coupling(line: LineBasis, frame: float) -> Floats:
+    """Integrals (n, i) of the edge functions of a line and its frame with the line's functions."""
+    length = line.length + 2 * frame
+    count = int(np.ceil(line.legendre.shape[1] * length / line.length))
+    # By the angle of cos = 2 x / length, in which edge functions are sines.
+    angles = np.arccos(np.clip(-2 * line.breaks / length, -1.0, 1.0))
+    angle, weights = gauss_points(angles, [2 * count] * (len(line.breaks) - 1))
+    x = -length / 2 * np.cos(angle)
+    weighted = (length / 2 * weights * np.sin(angle))[:, None] * line(x)
+    return np.asarray(edge_functions(np.arange(count), length, x).T @ weighted)
 
 
 def _edge_transforms(orders: Ints, length: float, kappa: Floats) -> tuple[Floats, Floats]:

@@ -63,7 +63,8 @@ class Plate:
     clips : ((x, y), ...) m, where the plate is fixed
     clip_radius : m, half a side of the fixed square; 0 fixes the deflection of a point only
     air_density : kg/m3, 0 in vacuum
-    baffle : whether a rigid wall around the plate separates the air on both sides
+    frame_width : m, of a rigid frame around the plate that separates the air on both sides; inf for
+        a baffle
     edge_loss : share of the energy of a mode that the edges take in a cycle, over 2 pi
 
     Raises a ValueError if a value is out of range or a clip is off the plate.
@@ -85,12 +86,14 @@ class Plate:
     clips: tuple[tuple[float, float], ...] = ()
     clip_radius: float = 0.0
     air_density: float = AIR_DENSITY
-    baffle: bool = True
+    frame_width: float = np.inf
     edge_loss: float = 0.0
 
     def __post_init__(self) -> None:
         check_numbers("a plate", self, "size_x", "size_y", "d11", "d22", "d66", "mass_per_area")
         more = ("tension_x", "tension_y", "clip_radius", "air_density", "edge_loss")
+        if not self.frame_width >= 0:
+            raise ValueError(f"frame_width = {self.frame_width} m of a plate must be 0 or above")
         check_numbers("a plate", self, *more, least="0 or above")
         if not self.d12**2 < self.d11 * self.d22:
             raise ValueError(
@@ -410,7 +413,7 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     mass = np.asarray(plate.mass_per_area * area, np.float64)
     patterns, orders = np.zeros((0, len(mass))), np.zeros((0, 2), np.int64)
     if plate.air_density:
-        added, patterns, orders = air_of(x, y, plate.air_density, baffle=plate.baffle)
+        added, patterns, orders = air_of(x, y, plate.air_density, plate.frame_width)
         mass += added
         for radiating in patterns[:1]:
             unit = radiating / np.linalg.norm(radiating)

@@ -69,8 +69,8 @@ class Body:
         bone in soft tissue
     file, unit, up : of a mesh, see `meshes.body_from_file`
     placement : position and rotation under the device
-    air : False for a sheet in vacuum; "free" (or True) if air flows around its edges, "baffle" if a
-        large rigid wall around the sheet separates both sides
+    air : False for a sheet in vacuum; "free" (or True) if air flows around its edges or frame,
+        "baffle" if a rigid wall larger than a wavelength of sound surrounds it
     mounting : Mounting, the supports and the tension of a sheet
 
     Raises a ValueError if a value is unknown, not finite or out of range.

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
-from math import pi, sqrt
+from math import inf, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -144,6 +144,13 @@ def air_mass(body: Body, frequency: float) -> float:
     return 2 * AIR_DENSITY / bending_wavenumber(body, frequency)
 
 
+def frame_in_air(body: Body) -> float:
+    """Return the width in m of what separates the air on both sides around a sheet."""
+    if body.air == "baffle":
+        return inf
+    return body.mounting.frame_width if body.mounting.is_frame else 0.0
+
+
 def refuse_unheld_air(body: Body) -> None:
     """Refuse air around a sheet that is not held by its edges."""
     if body.air and body.sides != "clamped":
@@ -159,7 +166,7 @@ def air(body: Body, build: Build, free: Ints) -> Air | None:
         return None
     refuse_unheld_air(body)
     return air_around(
-        build.mesh, free, AIR_DENSITY, baffle=body.air == "baffle",
+        build.mesh, free, AIR_DENSITY, frame=frame_in_air(body),
         axes=body.placement.rotation.T[:2], mirrored=build.symmetry,
     )  # fmt: skip
 

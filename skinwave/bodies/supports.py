@@ -125,6 +125,7 @@ class Mounting:
     curl_x, curl_y : float, m, height of the middle above the edges, between left and right and
         between front and back; the sheet is an unstressed parabola
     edge_loss : loss factor by the edges, of each mode at its own frequency
+    frame_width : float, m, of a frame around all edges, which open air flows around
 
     Raises a ValueError if a value is unknown or out of range, or the sheet is unconstrained.
     """
@@ -138,13 +139,14 @@ class Mounting:
     curl_x: float = 0.0
     curl_y: float = 0.0
     edge_loss: float = 0.0
+    frame_width: float = 0.025
 
     def __post_init__(self) -> None:
         for edge in self.edges:
             choose("edge", edge, EDGES)
         object.__setattr__(self, "edges", tuple(edge for edge in EDGES if edge in self.edges))
         choose("support", self.support, SUPPORTS)
-        numbers = ("tension_x", "tension_y", "clip_radius", "edge_loss")
+        numbers = ("tension_x", "tension_y", "clip_radius", "edge_loss", "frame_width")
         check_numbers("a sheet", self, *numbers, least="0 or above")
         if not (self.edges or self.clips):
             raise ValueError(
@@ -210,11 +212,18 @@ FRAME = Mounting()
 
 
 def check_extent(mounting: Mounting, width: float, height: float) -> None:
-    """Refuse clips outside a sheet, width and height in m, and a curl that is not shallow."""
+    """Refuse clips outside a sheet, width and height in m, a curl that is not shallow, and a frame
+    wider than the sheet.
+    """
     for name, side in (("curl_x", width), ("curl_y", height)):
         most = 1e3 * STEEPEST * side
         cure = ", the limits of a shallow shell; reduce it"
         check_range(name, 1e3 * getattr(mounting, name), -most, most, " mm", cure)
+    if (wide := mounting.frame_width) > max(width, height):
+        raise ValueError(
+            f"frame_width_mm = {1e3 * wide:g} is wider than the sheet; reduce it, or use "
+            'air = "baffle" for a wall'
+        )
     for x, y in mounting.clips:
         if not (abs(x) <= width / 2 and abs(y) <= height / 2):
             raise ValueError(

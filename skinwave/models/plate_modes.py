@@ -37,7 +37,7 @@ from simple_model.plates.modes import (
 )
 from simple_model.plates.von_karman import KarmanPlate, karman_plate
 from skinwave.bodies.body import Body
-from skinwave.bodies.sheet import equivalent
+from skinwave.bodies.sheet import equivalent, frame_in_air
 from skinwave.bodies.supports import EDGES
 from skinwave.models import Cost, Limit, Model, named, register
 from skinwave.models.costs import (
@@ -101,7 +101,7 @@ def plate_of(body: Body) -> Plate:
         d11=Q[0, 0], d22=Q[1, 1], d12=Q[0, 1], d66=Q[2, 2],
         tension_x=held.tension_x, tension_y=held.tension_y, **support,
         clips=held.clips, clip_radius=held.clip_radius if held.clips else 0.0,
-        air_density=AIR_DENSITY if body.air else 0.0, baffle=body.air == "baffle",
+        air_density=AIR_DENSITY if body.air else 0.0, frame_width=frame_in_air(body),
         edge_loss=held.edge_loss,
     )  # fmt: skip
 

@@ -318,6 +318,7 @@ MOUNTING = {
     **_numbers_of(
         clip_radius_mm="clip_radius", tension_x_n_per_m="tension_x", tension_y_n_per_m="tension_y",
         curl_x_mm="curl_x", curl_y_mm="curl_y", edge_loss="edge_loss",
+        frame_width_mm="frame_width",
     ),
 }  # fmt: skip
 BONE, RELIEF = (
