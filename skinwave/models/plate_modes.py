@@ -81,10 +81,10 @@ SHARE = 0.3  # of the tolerance, for the change by longer steps and fewer modes
 # Error over this change: 0.2 to 1.7, because modes converge slowly near a resonance.
 TRUNCATION = 2.0
 # Seconds of two modes of one symmetry, in the modes, and in a line with tension; of a line and a
-# mode; of the states of stress, and of a time step at large deflection with all its repetitions;
-# bytes of a sample, a probe and a mode, and of a step.
+# mode. Seconds and bytes of the states of stress; seconds of a time step at large deflection, with
+# all its repetitions; bytes of a sample, a probe and a mode, and of a step.
 OF_MODES, COUPLED_LINE, MODAL_FORCE = 2e-7, 1.7e-8, 1e-7
-OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = 1.5, 4e-4, 0.7, 6e3
+OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = (1.5, 8e7), 4e-4, 0.7, 6e3
 DEGREE = 5  # of the splines that are differentiated
 
 
@@ -535,9 +535,9 @@ def _stretched_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost
         parts={
             **linear.parts,
             LINES: 2 * linear.parts[LINES],
-            DURATION: OF_STATES + STRETCHED_STEP * steps,
+            DURATION: OF_STATES[0] + STRETCHED_STEP * steps,
         },
-        memory=linear.memory + OF_STEP * steps,
+        memory=linear.memory + OF_STATES[1] + OF_STEP * steps,
     )
 
 

@@ -194,7 +194,9 @@ def _models(scenes: Scenes, options: SolveOptions) -> dict[str, str]:
     if model != "auto" and not named(model).needs_body:
         raise ValueError(f"{model} moves no body. Choose a model of a body, or leave --model out")
     models: dict[str, str] = {}
-    for column, scene in (each for group in scenes.values() for each in group.items()):
+    every = [each for group in scenes.values() for each in group.items()]
+    for k, (column, scene) in enumerate(every):
+        options.progress("choose models", k / len(every))
         if not scene.body.of_kind.discretise:
             models[column] = column
             continue
