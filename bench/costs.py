@@ -119,11 +119,10 @@ def predicted(name: str, folder: Path) -> dict[str, object]:
     scene, options = scene_of(name, folder)
     started = time.perf_counter()
     found = plan(scene, options)
-    row = next((row for row in found.rows if row.what == "cost"), None)
     return {
         "planning": time.perf_counter() - started, "model": found.model, "seconds": found.seconds,
         "memory": found.memory, "h": found.h, "size": [found.body.width, found.body.height],
-        "symmetry": found.symmetry, "row": f"{row.value}: {row.reason}" if row else "",
+        "symmetry": found.symmetry,
     }  # fmt: skip
 
 
@@ -140,11 +139,7 @@ def measured(name: str, folder: Path, planned: dict[str, object]) -> dict[str, f
         found = compute(scene, options.model, h=options.h, tolerance=options.tolerance)
     wall, own = time.perf_counter() - wall, time.process_time() - own
     assert len(found.times) == len(sample_times(scene))
-    effort = found.effort
-    return {
-        "seconds": wall, "cpu": own, "memory": peak_memory(), "dofs": effort.dofs,
-        "steps": effort.steps, "reduced": effort.reduced_dofs, "phases": dict(effort.seconds),
-    }  # fmt: skip
+    return {"seconds": wall, "cpu": own, "memory": peak_memory()}
 
 
 def in_process(*arguments: str) -> dict[str, object]:
@@ -171,14 +166,6 @@ def compare(names: list[str]) -> None:
             f"{done['seconds']:8.2f} s{done['cpu']:6.1f} s{ratio[0]:7.2f}"
             f"{done['memory'] / 2**30:6.2f}{ratio[1]:7.2f}", flush=True,
         )  # fmt: skip
-        if os.environ.get("DETAILS"):
-            print(
-                "    ",
-                {k: done[k] for k in ("dofs", "steps", "reduced", "phases")},
-                planned["h"],
-                planned["row"],
-                flush=True,
-            )
 
 
 if __name__ == "__main__":
