@@ -83,7 +83,7 @@ TRUNCATION = 2.0
 # Seconds of two modes of one symmetry, in the modes, and in a line with tension; of a line and a
 # mode. Seconds and bytes of the states of stress; seconds of a time step at large deflection, with
 # all its repetitions; bytes of a sample, a probe and a mode, and of a step.
-OF_MODES, COUPLED_LINE, MODAL_FORCE = 2e-7, 1.7e-8, 1e-7
+OF_MODES, COUPLED_LINE, MODAL_FORCE = 3e-7, 1.7e-8, 1e-7
 OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = (1.5, 8e7), 4e-4, 0.7, 6e3
 DEGREE = 5  # of the splines that are differentiated
 
