@@ -205,7 +205,9 @@ def _integrals(scene: Scene) -> tuple[int, int, float, float]:
     omega = 2 * pi * LOSS_AT
     moduli = [solid.complex_modulus(omega) for _, solid in body.strata]
     loss = max(float(each.imag / each.real) for each in moduli) if isfinite(body.depth) else 1.0
-    return len(fields), terms, EVALUATION * (0.5 + layers), loss
+    is_plain = scene.reading.is_plain and scene.load.is_plain
+    orders = 1.0 if is_plain else sum(len(each.orders) for each in fields) / len(fields)
+    return len(fields), terms, EVALUATION * (0.5 + layers) * orders, loss
 
 
 def _cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
@@ -236,7 +238,7 @@ def _steady_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
     nodes = min(max(RESONANT_NODES / loss, FEWEST_NODES), MOST_NODES)
     lines = lines_below(scene, times)
     seconds, size = synthesis(scene, times)
-    evaluations = 2 * fields * nodes * lines
+    evaluations = fields * max(2 * nodes, 3 * FEWEST_NODES) * lines
     return Cost(
         parts={
             DURATION: START + seconds,

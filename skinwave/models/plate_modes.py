@@ -83,10 +83,10 @@ TRUNCATION = 2.0
 EXTRAPOLATED = 0.5  # of the error of the steps, left by extrapolation: 0.02 to 0.3
 LEAST_RATIO = 1.5  # of two lengths of steps that are extrapolated
 # Seconds of two modes of one symmetry, in the modes, and in a line with tension; of a line and a
-# mode; of the states of stress, and of a time step at large deflection with all its repetitions;
-# bytes of a sample, a probe and a mode, and of a step.
-OF_MODES, COUPLED_LINE, MODAL_FORCE = 2e-7, 1.7e-8, 1e-7
-OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = 1.5, 4e-4, 0.7, 6e3
+# mode. Seconds and bytes of the states of stress; seconds of a time step at large deflection, with
+# all its repetitions; bytes of a sample, a probe and a mode, and of a step.
+OF_MODES, COUPLED_LINE, MODAL_FORCE = 3e-7, 1.7e-8, 1e-7
+OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = (1.5, 8e7), 4e-4, 0.7, 6e3
 DEGREE = 5  # of the splines that are differentiated
 
 
@@ -568,9 +568,9 @@ def _stretched_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost
         parts={
             **linear.parts,
             LINES: 2 * linear.parts[LINES],
-            DURATION: OF_STATES + STRETCHED_STEP * steps,
+            DURATION: OF_STATES[0] + STRETCHED_STEP * steps,
         },
-        memory=linear.memory + OF_STEP * steps,
+        memory=linear.memory + OF_STATES[1] + OF_STEP * steps,
     )
 
 

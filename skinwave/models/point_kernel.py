@@ -17,7 +17,7 @@ NO_WAVES = ErrorPart(  # on any body, measured 0.98 to 1.04
     name="no waves", source="the point kernel", error=1.0, cure="use a model with waves"
 )
 
-SPOT = 1e-8  # s of the pressure of a focus at a probe and a sample
+SPOT = 3e-8  # s of the pressure of a focus at a probe and a sample
 
 
 def _same_load(scene: Scene, times: Floats, options: SolveOptions) -> Response:

@@ -62,7 +62,7 @@ FEWEST_MODES, MOST_MODES = 40, 160
 REDUCE, MARCH, MODE_PAIR, LINE, BYTES_PER_MODE = 3.6e-6, 5e-4, 1.5e-7, 4e-9, 70.0
 # Of the full model: seconds of the forces of a degree of freedom, iterations in a step, and memory
 # over that of linear models.
-DOFS_PER_CELL, ELEMENTS, ITERATIONS, FULL_MEMORY = 36.0, 1.2e-6, 3, 2.0
+DOFS_PER_CELL, ELEMENTS, ITERATIONS, FULL_MEMORY = 36.0, 1e-6, 3, 2.0
 RATES = DISPLACEMENT, VELOCITY, ACCELERATION
 MOST_LINES = 500  # of a load that are summed in each step
 

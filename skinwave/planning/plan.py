@@ -99,13 +99,15 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     >>> plan.model, round(plan.error, 3)
     ('flat-body-harmonic', 0.014)
     >>> for row in plan.rows:
-    ...     print(f"{row.what}: {row.value}")
+    ...     if row.what != "cost":
+    ...         print(f"{row.what}: {row.value}")
     highest line: 200 Hz
     model: flat-body-harmonic
-    cost: 0.06 s, 0.1 GiB
     expected error: start 1.4 %, integral 0.20 %; together 1.4 %
     """
+    options.progress("choose the model", 0.0)
     request = _choose_model(scene, options, sample_grid(scene, options.times))
+    options.progress("estimate errors", 0.0)
     model, tolerance = request.model, options.tolerance
     if scene.body.of_kind.discretise:
         planned, parts = (_plan_elements if model.is_refined else _plan_without_mesh)(request)

@@ -165,7 +165,9 @@ def page_of(
     failures = {} if failures is None else failures
     is_single = len(groups) == 1
     drawn = _drawn(figures or groups, gallery)
+    progress("draw maps", 0.0)
     own = _first_parts(first, gallery) if first else []
+    progress("draw maps", 0.5)
     spatial = _spatial_parts(first, gallery, failures) if first else []
     shown = _body_parts(runs, gallery, failures) if is_single else []
     body = [*before, *shown, *_waveforms(drawn, len(groups), progress), *after]
@@ -236,14 +238,14 @@ def write_run_page(
     parts that failed.
     """
     fill(folder, run)
-    first, failures = None, dict[str, str]()
+    first, failures, progress = None, dict[str, str](), options.progress
     if run.is_motion and run.scene.load.is_plain:
         group = with_kernels(run)
         scenes = {each.column: each.scene for each in group}
+        progress(f"map of {run.column}", 0.0)
         if has_quick_map(run.scene):
             found, failures = quick_surface(run, None)
         else:
-            options.progress(f"map of {run.column}", 0.0)
             found, failures = element_surfaces(
                 run.column, {run.tacton: run.scene}, options, played(scenes)
             )
@@ -252,7 +254,7 @@ def write_run_page(
     title = f"{run.tacton} on {label(run.body)}: {run.model}"
     page_of(
         title, {run.tacton: [run]}, first, Gallery(), after=more, command=command,
-        failures=failures,
+        progress=progress, failures=failures,
     ).write(folder)  # fmt: skip
     return failures
 

@@ -187,6 +187,7 @@ def hierarchy_of(
     not read the displacement of the surface, or no such device exists.
     """
     check_motion(scene, "relax")
+    progress("choose models", 0.0)
     names = droppable(scene)
     check_rate(update_rate)
     path = scene.tacton.trajectory

@@ -114,6 +114,7 @@ def picture_parts(
     progress("draw snapshots", 0.0)
     figure = maps.snapshots_figure(views, gallery.style)
     options["snapshots"] = gallery.figure("snapshots", figure, SNAPSHOTS)
+    progress("draw snapshots", 0.5)
     turned = inner_page(turntable(own, frame), f"{label(own.column)}. {TURNED}")
     return [Section("Pictures", [*missing, Choice("pictures", options), turned])]
 

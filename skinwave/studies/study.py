@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from simple_model import Response
+from simple_model import Effort, Response
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.live import html_file
 from skinwave.measure.comparison import (
@@ -47,6 +47,7 @@ from skinwave.system import document
 from skinwave.system.effort import Progress, one_thread, peak_memory, silent
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.processes import pool
+from skinwave.system.progress_bar import expecting
 
 # Models that plans choose, in the order of increasing completeness.
 COMPLETENESS = (
@@ -194,7 +195,9 @@ def _models(scenes: Scenes, options: SolveOptions) -> dict[str, str]:
     if model != "auto" and not named(model).needs_body:
         raise ValueError(f"{model} moves no body. Choose a model of a body, or leave --model out")
     models: dict[str, str] = {}
-    for column, scene in (each for group in scenes.values() for each in group.items()):
+    every = [each for group in scenes.values() for each in group.items()]
+    for k, (column, scene) in enumerate(every):
+        options.progress("choose models", k / len(every))
         if not scene.body.of_kind.discretise:
             models[column] = column
             continue
@@ -298,13 +301,15 @@ def _runs(
             continue  # all Tactons on this body failed
         with or_failed(failures, f"{name} on {column}"):
             if column in reduced and several:
+                progress(f"response of {name} by {column}", k / len(every))
                 response, body = answer(prepared[column], scene), prepared[column]
                 compared = coarser[column].result()
                 response = assess(scene, response, body, size_of[column], compared=compared)
             elif column not in reduced:
-                response, shown = others[name, column].result()
+                progress(f"response of {name} by {column} ({k + 1} of {len(every)})", 0.0)
+                with expecting(progress, _seconds(models[column], scene, options)):
+                    response, shown = others[name, column].result()
                 found.collect(*shown)
-        progress(f"response of {name} by {column}", (k + 1) / len(every))
         body_name = column if scene.body.of_kind.discretise else "none"
         if response:
             yield Run(tacton=name, body=body_name, scene=scene, response=response)
@@ -316,6 +321,12 @@ def _runs(
         with or_failed(failures, f"flat slab beside {column}"):
             if run := slab.result():
                 found.checks[column] = run
+
+
+def _seconds(model: str, scene: Scene, options: SolveOptions) -> float | None:
+    """Return the predicted seconds of a response without a reduced body, if they are known."""
+    cost = named(model).cost
+    return cost(scene, options, Effort()).seconds if cost else None
 
 
 def _report(progress: Progress, column: str, phase: str, fraction: float) -> None:

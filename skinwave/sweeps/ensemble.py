@@ -215,6 +215,7 @@ def ensemble(
         solved[k] = solutions
         progress("samples", len(solved) / len(batches))
 
+    progress("samples", 0.0)
     work = partial(_solve_batch, scene, keys, method)
     if workers > 1 and len(different) > FEW:
         engine.run_all(work, batches, "processes", workers, done)

@@ -116,8 +116,7 @@ class Sweep:
                 dataset.append(self.folder, numbered)
             for row in rows:
                 tally[row["status"]] += 1
-            finished = len(wanted) - len(missing) + sum(tally.values())
-            self.progress("run", finished / len(wanted))
+            self.progress("run", sum(tally.values()) / max(len(missing), 1))
 
         def distribute(work: Callable[[Any], Any], items: Sequence[Any], done: Any) -> None:
             engine.run_all(work, items, self.scheduler, count, done)
@@ -131,6 +130,7 @@ class Sweep:
             ])  # fmt: skip
             meshes = shared_meshes(runs.values(), self.options, count, distribute, self.progress)
             batches = self._batches(runs, meshes, count)
+            write([])
             work = partial(_rows, self.options, self.assessed)
             distribute(work, batches, lambda _, rows: write(rows))
         except KeyboardInterrupt:

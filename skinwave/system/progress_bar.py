@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
+from math import inf, isfinite
 
 from skinwave.system.effort import Progress, silent
 from skinwave.system.plain_text import printable, say
@@ -32,9 +33,9 @@ def expecting(progress: Progress, seconds: float | None) -> Iterator[None]:
     It counts down from them until a fraction above 0 is reported.
     """
     expect = progress.expect if isinstance(progress, _Bar) else lambda seconds: None
-    expect(seconds or 0.0)
+    expect(inf if seconds is None else seconds)
     yield
-    expect(0.0)
+    expect(inf)
 
 
 def step_of(phase: str, fraction: float) -> tuple[str, float]:
@@ -64,7 +65,7 @@ def progress_callback(progress: Progress | bool | None) -> Iterator[Progress]:
 @contextmanager
 def bar() -> Iterator[Progress]:
     """Yield a callback that shows a bar on a terminal, and otherwise a line for each step."""
-    last, started, expected = ("", 0.0), 0.0, 0.0
+    last = ("", 0.0)
     if not sys.stderr.isatty():
 
         def log(phase: str, fraction: float) -> None:
@@ -81,25 +82,24 @@ def bar() -> Iterator[Progress]:
     from rich.progress_bar import ProgressBar
     from rich.text import Text
 
+    begun, end, is_expected = time.monotonic(), inf, False  # of the phase, in s
+
     class Fill(rich.BarColumn):
-        """Completed share: by the expected seconds of phases that report none."""
+        """Completed share; of a phase that reports none, by its expected seconds."""
 
         def render(self, task: rich.Task) -> ProgressBar:
             filled = super().render(task)
-            if expected:
-                filled.completed = min((time.monotonic() - started) / expected, 1.0)
+            if is_expected:
+                filled.completed = min((time.monotonic() - begun) / (end - begun), 1.0)
             return filled
 
-    class Remaining(rich.TimeRemainingColumn):
-        """Remaining time, likewise."""
-
-        max_refresh = 0.0  # s
+    class Remaining(rich.ProgressColumn):
+        """Time until the expected end, or until that which the completed share suggests."""
 
         def render(self, task: rich.Task) -> Text:
-            if not expected:
-                return super().render(task)
-            left = max(0, round(started + expected - time.monotonic()))
-            return Text(str(timedelta(seconds=left)), style="progress.remaining")
+            left = max(0.0, end - time.monotonic())
+            text = str(timedelta(seconds=round(left))) if isfinite(left) else "-:--:--"
+            return Text(text, style="progress.remaining")
 
     text = rich.TextColumn("{task.description:<36}", markup=False)
     columns = text, Fill(), rich.TimeElapsedColumn(), Remaining()
@@ -107,16 +107,22 @@ def bar() -> Iterator[Progress]:
         task = shown.add_task("", total=1.0)
 
         def expect(seconds: float) -> None:
-            nonlocal started, expected
-            started, expected = time.monotonic(), seconds
+            nonlocal begun, end, is_expected
+            is_expected = seconds < inf
+            begun = time.monotonic()
+            end = begun + seconds
 
         def show(phase: str, fraction: float) -> None:
-            nonlocal last, expected
-            step = step_of(phase, fraction)
-            expected = 0.0 if fraction > 0 else expected
-            if step[1] < last[1]:  # the next body, or a phase after the steps
+            nonlocal last, end, is_expected
+            name, done = step_of(phase, fraction)
+            if done < last[1]:  # the next body, or a phase after the steps
                 shown.reset(task)
-            shown.update(task, description=printable(step[0], ""), completed=step[1])
-            last = step
+            if done < last[1] or not (done or is_expected):
+                expect(inf)
+            if done and (fraction or not is_expected):
+                now = time.monotonic()
+                end, is_expected = now + (now - begun) * (1 - done) / done, False
+            shown.update(task, description=printable(name, ""), completed=done)
+            last = name, done
 
         yield _Bar(show, expect)
