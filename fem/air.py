@@ -110,7 +110,8 @@ def air_around(
             np.arange(0, int(np.ceil(FINEST * size / 2)) + SPARE, 1 + image)
             for size, image in zip(sizes, images, strict=True)
         ]
-        inverse, integrals = open_air(sizes, orders, density)
+        names = tuple(tuple(each.tolist()) for each in orders)
+        inverse, integrals = open_air(tuple(sizes), names, density)
         of_x, of_y = (
             edge_functions(n, size, at) for n, size, at in zip(orders, sizes, (x, y), strict=True)
         )

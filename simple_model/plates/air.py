@@ -31,7 +31,7 @@ edges are left out.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from math import factorial, pi
 
 import numpy as np
@@ -115,7 +115,8 @@ def air_of(
         couplings = [_edge_coupling(line, frame) for line in (x, y)]
         orders = [np.flatnonzero(np.abs(each).max(axis=1) > ZERO) for each in couplings]
         sizes = [line.length + 2 * frame for line in (x, y)]
-        inverse, whole = open_air(sizes, orders, density)
+        names = tuple(tuple(each.tolist()) for each in orders)
+        inverse, whole = open_air(tuple(sizes), names, density)
         of_x, of_y = (each[n] for each, n in zip(couplings, orders, strict=True))
         pairs = inverse.reshape(len(of_x), len(of_y), len(of_x), len(of_y))
         mass = np.einsum("abcd,ai,bj,ck,dl->ijkl", pairs, of_x, of_y, of_x, of_y, optimize=True)
@@ -138,8 +139,9 @@ def air_of(
     return 4 / np.sqrt(pi) * density * mass, patterns, np.array(exponents)
 
 
+@lru_cache(maxsize=8)  # sheets of one size share their air
 def open_air(
-    sizes: Sequence[float], orders: Sequence[Ints], density: float
+    sizes: tuple[float, ...], orders: tuple[tuple[int, ...], ...], density: float
 ) -> tuple[Floats, Floats]:
     """Pressure of incompressible air around a rectangle of two sizes in m, as a sum of products, y
     fastest, of `edge_functions` with orders (i,) along x and (j,) along y; density in kg/m3.
@@ -147,16 +149,17 @@ def open_air(
     Returns the coefficients (k, k) in kg/m6 per integral of the acceleration with each product, and
     the integrals (k,) in m2 of the products.
     """
+    each_orders = [np.array(each) for each in orders]
     # Where k is large, transforms decay as k^(-3/2) beyond the square of the order only.
     nearest = NEAREST * min(
-        size / (1 + n.max()) ** 2 for size, n in zip(sizes, orders, strict=True)
+        size / (1 + n.max()) ** 2 for size, n in zip(sizes, each_orders, strict=True)
     )
     distances = _distances(nearest, FARTHEST * max(sizes))
     (x, slope_x), (y, slope_y) = (
         map(np.stack, zip(*(
             _gaussian_products(partial(_edge_transforms, n, size), size, t) for t in distances
         ), strict=True))
-        for size, n in zip(sizes, orders, strict=True)
+        for size, n in zip(sizes, each_orders, strict=True)
     )  # fmt: skip
     pairs = [(slope_x, y), (x, slope_y)]
     inertia = _sum_over_distances(distances, pairs)
@@ -166,10 +169,16 @@ def open_air(
     rest = first / (1 - ratio) + (first - second) / (1 - ratio) ** 2
     inertia += STEP * distances[0] * ratio * rest
     # int sqrt(1 - s^2) ds = pi / 2 for order 0
-    whole = np.kron(*(np.where(n == 0, pi / 4 * size, 0.0)
-                      for size, n in zip(sizes, orders, strict=True)))  # fmt: skip
-    inverse = linalg.inv(inertia / (np.sqrt(pi) * density), check_finite=False)
-    return np.asarray(inverse, np.float64), np.asarray(whole)
+    of_x, of_y = (
+        np.where(n == 0, pi / 4 * size, 0.0) for size, n in zip(sizes, each_orders, strict=True)
+    )
+    whole = np.asarray(np.kron(of_x, of_y), np.float64)
+    inverse = np.asarray(
+        linalg.inv(inertia / (np.sqrt(pi) * density), check_finite=False), np.float64
+    )
+    for kept in (inverse, whole):
+        kept.setflags(write=False)
+    return inverse, whole
 
 
 def edge_functions(orders: Ints, length: float, x: Floats) -> Floats:

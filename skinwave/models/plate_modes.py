@@ -56,7 +56,7 @@ from skinwave.models.limits import clamped_sheet_limits, of_body, surface_limits
 from skinwave.models.options import SolveOptions, response_of, sample_times
 from skinwave.models.relative_change import relative_changes
 from skinwave.scene.scene import Scene
-from skinwave.system.effort import Progress, peak_memory, silent
+from skinwave.system.effort import Progress, one_thread, peak_memory, silent
 from skinwave.typing import Complex, Floats
 
 PLATES = "A. W. Leissa: Vibration of Plates. NASA SP-160, 1969"
@@ -141,12 +141,14 @@ class Driven:
     outputs: Floats
 
 
+@one_thread()
 def steady_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Solve the steady state of the modes for all lines below half the sampling rate."""
     started, driven = time.perf_counter(), _drive(scene, times, options.progress)
     return _response(scene, times, MODES.name, driven, _steady(scene, driven, times), started)
 
 
+@one_thread()
 def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Complex]:
     """Return frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity in the
     steady state, at places (p, 2) in m or at its probes. Raises a ValueError if the load has no
@@ -159,6 +161,7 @@ def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Co
     return driven.frequencies, _amplitudes(scene, driven)
 
 
+@one_thread()
 def answer_from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Solve the steady state and the free vibration after a start from rest."""
     started, driven = time.perf_counter(), _drive(scene, times, options.progress)
@@ -166,6 +169,7 @@ def answer_from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Resp
     return _response(scene, times, FROM_REST.name, driven, values, started)
 
 
+@one_thread()
 def thin_plate_part(scene: Scene) -> ErrorPart:
     """Return the part of the error that is due to shear and rotary inertia.
 
@@ -198,6 +202,7 @@ def without_shear(scene: Scene, error: float) -> ErrorPart:
     return ErrorPart(name="thin plate", source=source, error=error, cure=cure)
 
 
+@one_thread()
 def sensitivity(scene: Scene) -> float:
     """Return the relative change of the waveforms per relative change of natural frequencies."""
     return effect_of(_detuned, scene, len(sample_times(scene))) / DETUNING
@@ -370,6 +375,7 @@ FROM_REST = register(
 )
 
 
+@one_thread()
 def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Solve the linear motion from rest, and add the effect of stretching."""
     started = time.perf_counter()
@@ -394,6 +400,7 @@ def first_part(scene: Scene, times: Floats) -> Floats:
     return times[: max(2, round(max(FIRST_DURATION, 1 / slowest) / step(times)) + 1)]
 
 
+@one_thread()
 def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
     """Return the largest relative error of a linear response (t, p) from rest."""
     count = min(COUNTS[0], len(modes_of(plate_of(scene.body)).squared))
@@ -404,6 +411,7 @@ def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
 
 
 @lru_cache(maxsize=1)
+@one_thread()
 def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Callable[..., Floats]]:
     """Return the motion of a whole sheet from rest: times (t,) in s, coordinates (t, m) in kg^1/2 m
     of all modes that move, and the function of their shapes (p, m) at places (p, 2) in m.
