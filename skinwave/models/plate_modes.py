@@ -85,8 +85,8 @@ LEAST_RATIO = 1.5  # of two lengths of steps that are extrapolated
 # Seconds of two modes of one symmetry, in the modes, and in a line with tension; of a line and a
 # mode. Seconds and bytes of the states of stress; seconds of a time step at large deflection, with
 # all its repetitions; bytes of a sample, a probe and a mode, and of a step.
-OF_MODES, COUPLED_LINE, MODAL_FORCE = 3e-7, 1.7e-8, 1e-7
-OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = (1.5, 8e7), 4e-4, 0.7, 6e3
+OF_MODES, COUPLED_LINE, MODAL_FORCE = 1e-6, 3e-9, 1e-7
+OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = (1.0, 2e7), 1.6e-4, 0.7, 6e3
 DEGREE = 5  # of the splines that are differentiated
 
 
@@ -332,7 +332,7 @@ def _cost(from_rest: bool, scene: Scene, options: SolveOptions, effort: Effort) 
     times, modes = computed_times(scene, options), modes_of(plate_of(scene.body))
     sizes = np.array([len(family.squared) for family in modes.families])
     lines, pairs = lines_below(scene, times), int((sizes**2).sum())
-    coupled = any(family.bending is not None for family in modes.families)
+    coupled = any(family.bending is not None or family.air for family in modes.families)
     seconds, size = synthesis(scene, times)
     summed = len(times) * len(scene.probes) * int(sizes.sum()) if from_rest else 0
     return Cost(
