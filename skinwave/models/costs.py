@@ -15,7 +15,7 @@ from skinwave.typing import Floats
 
 START = 0.01  # s of any response
 PROCESS = 1.4e8  # bytes of a process with all libraries
-SYNTHESIS = 5e-8, 64  # s and bytes of one line at one sample
+SYNTHESIS = 1.5e-8, 64  # s and bytes of one line at one sample
 SUMMED = 2e-9  # s of an exponential at a sample and an output
 
 # Changes that make parts of a response cheaper.

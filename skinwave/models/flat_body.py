@@ -69,7 +69,7 @@ SHEARED_DURATION = 0.1  # s of the responses of a thin and a thick sheet that ar
 INDENTED = 1.25
 # Seconds of a wavenumber, a frequency and a layer; of a sample, a distance and a probe in a
 # transform; of a wavenumber and a distance; of a distance, a probe and a position of the path.
-EVALUATION, TRANSFORM, BESSEL, PATTERN = 2.5e-7, 2.5e-8, 6e-7, 3e-8
+EVALUATION, TRANSFORM, BESSEL, PATTERN = 2.5e-7, 2.5e-8, 4e-7, 1.2e-8
 # Evaluations of a transient with much loss; loss tangent at a frequency in Hz below which they
 # increase; wavenumbers of a line times that tangent.
 EVALUATIONS, RESONANT, LOSS_AT, RESONANT_NODES = 1.1e5, 0.12, 200.0, 30.0

@@ -85,7 +85,7 @@ LEAST_RATIO = 1.5  # of two lengths of steps that are extrapolated
 # Seconds of two modes of one symmetry, in the modes, and in a line with tension; of a line and a
 # mode. Seconds and bytes of the states of stress; seconds of a time step at large deflection, with
 # all its repetitions; bytes of a sample, a probe and a mode, and of a step.
-OF_MODES, COUPLED_LINE, MODAL_FORCE = 1e-6, 3e-9, 1e-7
+OF_MODES, COUPLED_LINE, MODAL_FORCE = 1.4e-6, 3e-9, 1e-7
 OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = (1.0, 2e7), 1.6e-4, 0.7, 6e3
 DEGREE = 5  # of the splines that are differentiated
 
