@@ -34,7 +34,7 @@ from simple_model.plates.air import edge_functions, open_air
 FLAT = np.eye(3)[:2]
 GRID_TOLERANCE = 1e-6  # of a spacing, between a node and its place on the grid
 FINEST = 350.0  # rad/m, of the pressure in open air
-SPARE = 6  # functions of this pressure more than the wavenumber requires
+SPARE = 6  # functions of this pressure on the sheet more than the wavenumber requires
 RESISTANCES = {"friction": 0.5, "monopole": 2.0, "dipole": 4.0}  # powers of angular frequency
 HIGHEST = 2 * np.pi * 1000.0  # rad/s: resistances grow no further, as sound of short waves does not
 
@@ -107,7 +107,9 @@ def air_around(
             for at, image in zip((x, y), images, strict=True)
         ]
         orders = [
-            np.arange(0, int(np.ceil(FINEST * size / 2)) + SPARE, 1 + image)
+            np.arange(
+                0, int(np.ceil(FINEST * size / 2 + SPARE * size / (size - 2 * frame))), 1 + image
+            )
             for size, image in zip(sizes, images, strict=True)
         ]
         names = tuple(tuple(each.tolist()) for each in orders)

@@ -48,6 +48,7 @@ NEAREST = 0.3  # over the highest wavenumber: for smaller t all Gaussians are 1
 FARTHEST = 100.0  # sides: larger t contribute 1e-3 of the mass
 DECAYED = 6.0  # exp(-36) is negligible
 ORDER = 6  # of moments
+SHORTEST = 3.0  # rad: sound of a larger k0 times half the diagonal has the resistance at this one
 ZERO = 1e-9  # of the largest integral, of functions that another symmetry excludes
 
 
@@ -58,13 +59,16 @@ class AirLoss:
     In a baffle, `patterns` (q, m) are the integrals of their deflections times x^a y^b, with the
     exponents `orders` (q, 2). In open air there are no orders, and the pattern, if there is one, is
     the force of the air per acceleration. `areas` (m,) are the integrals of the squared
-    deflections; `density` is that of the air in kg/m3.
+    deflections; `density` is that of the air in kg/m3; `reach` is half the diagonal of the plate in
+    m. At wavelengths below about the diagonal, resistance to sound grows no further: the moments
+    would diverge.
     """
 
     patterns: Floats
     orders: Ints
     areas: Floats
     density: float
+    reach: float
 
     def scaled(self, factors: Floats) -> "AirLoss":
         """Loss of the motions times factors (m,)."""
@@ -75,6 +79,7 @@ class AirLoss:
         (m,) with the forces patterns^T R patterns v.
         """
         k0 = np.asarray(omega, np.float64)[:, None, None] / SPEED_OF_SOUND
+        k0 = np.minimum(k0, SHORTEST / self.reach)
         if not len(self.orders):
             each = np.eye(len(self.patterns))
             return np.asarray(k0**4 * SPEED_OF_SOUND / (12 * pi * self.density) * each)

@@ -432,6 +432,7 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
         air = AirLoss(
             patterns=patterns @ shapes, orders=orders,
             areas=(shapes * (area @ shapes)).sum(axis=0), density=plate.air_density,
+            reach=float(np.hypot(plate.size_x, plate.size_y)) / 2,
         )  # fmt: skip
     return Family(
         x=x, y=y, squared=squared, bending=between, air=air,

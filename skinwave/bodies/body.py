@@ -41,7 +41,7 @@ from skinwave.system import extensions
 from skinwave.typing import Floats
 
 KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
-AIR: dict[bool | str, bool | str] = {False: False, True: "free"}  # in short
+AIR = (False, "free", "baffle")
 LARGEST = 2.0  # m: larger numbers are probably in mm
 
 
@@ -100,7 +100,7 @@ class Body:
 
     def __post_init__(self) -> None:
         kind = self.of_kind
-        object.__setattr__(self, "air", AIR.get(self.air, self.air))
+        object.__setattr__(self, "air", "free" if self.air is True else self.air)
         check_material(self.material)
         check_base(self.base, self.base_stiffness, depth=self.depth, is_plate=kind.is_plate)
         object.__setattr__(self, "sides", complete_sides(self.sides, kind.named_sides, self.kind))
@@ -133,8 +133,10 @@ class Body:
         """Refuse properties that only a sheet has, and supports that contradict each other."""
         if self.solid.orthotropy is not None and not self.of_kind.is_plate:
             raise ValueError("an orthotropic material is for a sheet; use an isotropic material")
-        if self.air:
-            choose("air", str(self.air), ("free", "baffle"))
+        if self.air not in AIR:
+            raise ValueError(
+                f'air = {self.air!r} is unknown; use "free", "baffle", or false for vacuum'
+            )
         if self.air == "baffle" and self.sides == "clamped" and not self.mounting.is_frame:
             raise ValueError(
                 f'air = "baffle" needs a sheet in a frame, not one {self.mounting.words}; '

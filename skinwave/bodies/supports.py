@@ -213,13 +213,13 @@ FRAME = Mounting()
 
 def check_extent(mounting: Mounting, width: float, height: float) -> None:
     """Refuse clips outside a sheet, width and height in m, a curl that is not shallow, and a frame
-    wider than the sheet.
+    wider than the sheet and than the default.
     """
     for name, side in (("curl_x", width), ("curl_y", height)):
         most = 1e3 * STEEPEST * side
         cure = ", the limits of a shallow shell; reduce it"
         check_range(name, 1e3 * getattr(mounting, name), -most, most, " mm", cure)
-    if (wide := mounting.frame_width) > max(width, height):
+    if (wide := mounting.frame_width) > max(width, height, FRAME.frame_width):
         raise ValueError(
             f"frame_width_mm = {1e3 * wide:g} is wider than the sheet; reduce it, or use "
             'air = "baffle" for a wall'

@@ -198,7 +198,7 @@ def sheet_sound() -> Checks:
         wave = np.kron(of_x[:, m // 2], of_y[:, n // 2])
         loss = AirLoss(
             patterns=patterns @ wave[:, None], orders=orders, areas=np.zeros(1),
-            density=AIR_DENSITY,
+            density=AIR_DENSITY, reach=np.hypot(a, b) / 2,
         )  # fmt: skip
         found = loss.of_each(np.array([SPEED_OF_SOUND]))[0, 0] / 2 / AIR_DENSITY / SPEED_OF_SOUND
         first = [(1 - 8 / (k * np.pi) ** 2) * q for k, q in ((m, a / b), (n, b / a))]

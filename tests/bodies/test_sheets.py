@@ -229,6 +229,9 @@ def test_models_refuse_sheets_that_they_do_not_cover():
     assert not refused("fem", replace(two, air="free"))
     with pytest.raises(ValueError, match='hold all edges, or use air = "free"'):
         replace(two, air="baffle")
+    for unknown in ("none", ""):
+        with pytest.raises(ValueError, match="or false for vacuum"):
+            replace(two, air=unknown)
     lossy = replace(two, mounting=replace(TWO, edge_loss=0.01))
     assert [limit.cure for limit in refused("fem", lossy)] == ["set edge_loss = 0"]
     assert not refused("plate-modes", lossy)
@@ -256,3 +259,9 @@ def test_modes_that_loss_couples_are_at_rest_at_first():
     scene = Scene(pressure=load, body=body, probes=((0.005, 0.0),))
     motion = named("plate-modes-transient").solve(scene, np.arange(500) / 1e4, SolveOptions())
     assert np.abs(motion.values[0]).max() < 1e-6 * np.abs(motion.values).max()
+
+
+def test_a_sheet_smaller_than_the_default_frame_can_be_stretched():
+    small = replace(BODIES["a6-sheet"], width=0.01, height=0.01, mounting=Mounting(tension_x=10.0))
+    with pytest.raises(ValueError, match="frame_width_mm = 30 is wider than the sheet"):
+        replace(small, mounting=Mounting(frame_width=0.03))

@@ -192,3 +192,12 @@ def test_a_frame_in_open_air_acts_on_the_mass_between_none_and_a_baffle():
     ]
     assert np.all(np.diff(found) < 0)
     assert found[1] - found[3] < 0.7 * (found[0] - found[3])
+
+
+@pytest.mark.parametrize("frame_width", [np.inf, 0.02])
+def test_all_modes_of_a_large_plate_vibrate(frame_width):
+    """Resistance is bounded where wavelengths are too short for the moments of sound."""
+    modes = plate_modes(replace(SHEET, size_x=0.4, size_y=0.05, frame_width=frame_width))
+    assert np.all(modes.damping < 0.1 * np.sqrt(modes.squared))
+    solid = Material(density=800.0, shear_modulus=1e9, poisson=0.3, viscosity=0.1)
+    assert np.isfinite(free_modes(modes, solid).residues).all()
