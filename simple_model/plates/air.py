@@ -144,7 +144,7 @@ def air_of(
     return 4 / np.sqrt(pi) * density * mass, patterns, np.array(exponents)
 
 
-@lru_cache(maxsize=8)  # sheets of one size share their air
+@lru_cache(maxsize=4)  # sheets of one size share their air
 def open_air(
     sizes: tuple[float, ...], orders: tuple[tuple[int, ...], ...], density: float
 ) -> tuple[Floats, Floats]:

@@ -348,7 +348,7 @@ class _Coupled:
         for _ in range(SWEEPS):
             image = self.own * along + self.between(along)
             with np.errstate(divide="ignore", invalid="ignore"):  # of lines that are solved
-                step = np.nan_to_num(size / (along * image).sum(axis=1))[:, None]
+                step = np.nan_to_num(size / (along * image).sum(axis=1), posinf=0.0)[:, None]
             q, left = q + step * along, left - step * image
             open_lines = ~(np.abs(left).max(axis=1) <= allowed)
             if not open_lines.any():
@@ -356,7 +356,7 @@ class _Coupled:
             toward, before = together(left), size
             size = (left * toward).sum(axis=1)
             with np.errstate(divide="ignore", invalid="ignore"):
-                along = toward + np.nan_to_num(size / before)[:, None] * along
+                along = toward + np.nan_to_num(size / before, posinf=0.0)[:, None] * along
         for k in np.flatnonzero(open_lines).tolist():
             q[k] = np.linalg.solve(self.block(k, slice(None)), forces[k])
         return q

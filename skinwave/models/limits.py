@@ -269,7 +269,7 @@ def held_air_limits(body: Body) -> Iterator[Limit]:
 def _edge_limits(body: Body) -> Iterator[Limit]:
     if body.mounting.edge_loss:
         yield Limit(
-            why="has edges without loss",
+            why="does not include lossy edges",
             cure="set edge_loss = 0", change=of_part("mounting", edge_loss=0.0),
         )  # fmt: skip
 

@@ -51,7 +51,7 @@ ASSUMPTIONS = {
 }
 LARGER = 1.25  # element size over the default one, at a third of the time
 DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
-LITTLE_LOSS = 0.1  # of the material's own loss: an undamped resonance has no bound
+LITTLE_LOSS = 0.1  # of the loss of material and edges: an undamped resonance has no bound
 RELAXATION_TIME = PRESETS["palm-zener"].prony[0].time
 LEAST_LONG_TERM = 0.5  # share of the static modulus that does not relax
 LAYERS = (
@@ -228,6 +228,9 @@ def _body(scene: Scene, dropped: Collection[str], h: float | None) -> Body:
     if body.of_kind.is_plate:
         open_air = "baffle" in dropped or not body.mounting.is_frame
         changes["air"] = "vacuum" in dropped and ("free" if open_air else "baffle")
+        share = 1.0 if "little loss" in dropped else LITTLE_LOSS
+        edge_loss = share * body.mounting.edge_loss
+        changes["mounting"] = replace(body.mounting, edge_loss=edge_loss)
     if "flat" in dropped:
         width = min(body.width, BODIES["palm"].width)
         merged = (merged_layer(layers),) if layers else ()
