@@ -171,6 +171,6 @@ def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Float
         return np.sum([exponential_sum(rates[k], amplitudes[k], times) for k in parts], axis=0)
     within = np.exp(rates * times[:CHUNK, None])
     starts = np.exp(rates * times[::CHUNK, None])
-    driven = (starts[:, :, None] * amplitudes).transpose(1, 0, 2).reshape(j, -1)
+    driven = (starts[:, :, None] * amplitudes).transpose(1, 0, 2).reshape(j, len(starts) * p)
     summed = within.real @ driven.real - within.imag @ driven.imag
-    return summed.reshape(len(within), -1, p).swapaxes(0, 1).reshape(-1, p)[: len(times)]
+    return summed.reshape(len(within), len(starts), p).swapaxes(0, 1).reshape(-1, p)[: len(times)]

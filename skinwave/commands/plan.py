@@ -27,11 +27,12 @@ def run(options: argparse.Namespace) -> int:
 
     from skinwave.planning.budget import mesh_row
     from skinwave.scene.file import read
+    from skinwave.system.progress_bar import announce
 
     scene = read(options.scene)
     with progress_of(options) as progress:
         found = plan_of_command(options, scene, progress=progress)
-        progress("uncertainty", 0.0)
+        announce(progress, "uncertainty")
         row = mesh_row(replace(scene, body=found.body), found.h, found.error)
     found = replace(found, rows=(*found.rows, row))
     width = [max(len(getattr(row, name)) for row in found.rows) for name in ("what", "value")]

@@ -35,6 +35,7 @@ from skinwave.planning.record import Plan, PlanRow
 from skinwave.planning.refinement import above_band, refine
 from skinwave.planning.rows import cost_row, element_rows, neglected_rows
 from skinwave.scene.scene import Scene
+from skinwave.system.progress_bar import announce
 from skinwave.typing import Floats
 
 THE_LOAD = ErrorPart(name="load", source="the pressure at the probes", error=0.0)
@@ -105,9 +106,9 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     model: flat-body-harmonic
     expected error: start 1.4 %, integral 0.20 %; together 1.4 %
     """
-    options.progress("choose the model", 0.0)
+    announce(options.progress, "choose the model")
     request = _choose_model(scene, options, sample_grid(scene, options.times))
-    options.progress("estimate errors", 0.0)
+    announce(options.progress, "estimate errors")
     model, tolerance = request.model, options.tolerance
     if scene.body.of_kind.discretise:
         planned, parts = (_plan_elements if model.is_refined else _plan_without_mesh)(request)

@@ -49,6 +49,7 @@ from skinwave.system.document import Details, Part, Picture, Report, warnings_ba
 from skinwave.system.effort import Progress, peak_memory
 from skinwave.system.failures import REASONS, failure_text, reason
 from skinwave.system.processes import pool
+from skinwave.system.progress_bar import announce
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
@@ -187,7 +188,7 @@ def hierarchy_of(
     not read the displacement of the surface, or no such device exists.
     """
     check_motion(scene, "relax")
-    progress("choose models", 0.0)
+    announce(progress, "choose models")
     names = droppable(scene)
     check_rate(update_rate)
     path = scene.tacton.trajectory

@@ -47,7 +47,7 @@ from skinwave.system import document
 from skinwave.system.effort import Progress, one_thread, peak_memory, silent
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.processes import pool
-from skinwave.system.progress_bar import expecting
+from skinwave.system.progress_bar import announce, expecting
 
 # Models that plans choose, in the order of increasing completeness.
 COMPLETENESS = (
@@ -197,7 +197,7 @@ def _models(scenes: Scenes, options: SolveOptions) -> dict[str, str]:
     models: dict[str, str] = {}
     every = [each for group in scenes.values() for each in group.items()]
     for k, (column, scene) in enumerate(every):
-        options.progress("choose models", k / len(every))
+        announce(options.progress, "choose models", k / len(every))
         if not scene.body.of_kind.discretise:
             models[column] = column
             continue

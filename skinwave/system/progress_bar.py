@@ -38,6 +38,12 @@ def expecting(progress: Progress, seconds: float | None) -> Iterator[None]:
     expect(inf)
 
 
+def announce(progress: Progress, phase: str, fraction: float = 0.0) -> None:
+    """Show a phase on a bar, but not as a line on a pipe: it may refuse the input, in one line."""
+    if isinstance(progress, _Bar):
+        progress(phase, fraction)
+
+
 def step_of(phase: str, fraction: float) -> tuple[str, float]:
     """Return the phase with the number of its step and the completed share of all steps; for other
     phases, the share of the phase.
