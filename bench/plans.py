@@ -54,7 +54,7 @@ AM = "am_frequency_hz = 140\nduration_s = 0.5"
 CIRCLE = "shape = 'circle'\nsize_mm = 20\nspeed_m_per_s = 12"
 SHEETS = {  # Tacton and body
     "paper sheet, AM 140 Hz": (f"{AM}\n{CIRCLE}", "preset = 'paper-sheet'"),
-    "its mode of 71 Hz": ("am_frequency_hz = 71\nduration_s = 0.5", "preset = 'paper-sheet'"),
+    "AM 71 Hz": ("am_frequency_hz = 71\nduration_s = 0.5", "preset = 'paper-sheet'"),
     "twice the pressure": (
         f"{AM}\n{CIRCLE}\n[focus]\npeak_pressure_pa = 100",
         "preset = 'paper-sheet'",
