@@ -25,7 +25,8 @@ from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Array, Floats
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
-FIRST_HAND = 1.6  # of the default element size, for hands
+# The same for hands, of which two close meshes differ by chance more than by their sizes.
+FIRST_HAND, RATIO_HAND = 2.4, 1.7
 FINEST = 0.4  # of the default element size: the finest that is tried
 STILL = 1e-6  # of the waveforms: weaker motion about their mean is round-off
 
@@ -95,11 +96,14 @@ def refine(
 
     check_mesh(body, h or default_size(body))
     sizes = element_sizes(body)
+    apart = RATIO if body.of_kind.conforming else RATIO_HAND
     before = comparison_size(body, h) if h else sizes[0]
-    size = h or finer_sizes(sizes, before)[0]
-    coarse, other = solve(before)
+    size = h or finer_sizes(sizes, before, apart)[0]
+    solved = {before: solve(before)}
     while True:
         prepared, values = solve(size)
+        before = min(solved, key=lambda other: abs(np.log(other / size / apart)))
+        coarse, other = solved[before]
         same = coarse.effort.dofs == prepared.effort.dofs
         if same:  # the cost of the first
             prepared = replace(
@@ -108,7 +112,7 @@ def refine(
         error = mesh_error(body, (before, size), (other, values), same=same)
         if h or not tolerance < error < np.inf or size == sizes[-1]:
             return Refined(h=size, error=error, compared=before, prepared=prepared)
-        before, coarse, other = size, prepared, values
+        solved[size] = prepared, values
         size = CONTROLLER.nearest(finer_sizes(sizes, size), size, error, tolerance)
 
 
@@ -134,9 +138,9 @@ def element_sizes(body: Body) -> Floats:
     return sizes[max(0, np.count_nonzero(sizes >= coarsest) - 1) :]
 
 
-def finer_sizes(sizes: Floats, size: float) -> Floats:
-    """Return the sizes that are finer than a size by `RATIO` or more, or the last size."""
-    coarser = np.count_nonzero(sizes > size / RATIO * (1 + 1e-9))
+def finer_sizes(sizes: Floats, size: float, ratio: float = RATIO) -> Floats:
+    """Return the sizes that are finer than a size by a ratio or more, or the last size."""
+    coarser = np.count_nonzero(sizes > size / ratio * (1 + 1e-9))
     return sizes[min(coarser, len(sizes) - 1) :]
 
 
