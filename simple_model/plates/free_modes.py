@@ -1,7 +1,7 @@
 """Free vibration of a plate's modes with Maxwell branches in bending.
 
-A mode of squared frequency w^2, of which bending makes the share e, and of damping c by air and
-edges, has the dynamic stiffness D(s) = s^2 + c s + w^2 [1 - e + e h(s)] with
+Bending makes the share e of the squared frequency w^2 of a mode; air and edges damp it by c. Its
+dynamic stiffness is D(s) = s^2 + c s + w^2 [1 - e + e h(s)] with
 
     h(s) = h_0 + lag s + sum_j h_j s tau_j / (1 + s tau_j),
 

@@ -92,9 +92,9 @@ class Plate:
     def __post_init__(self) -> None:
         check_numbers("a plate", self, "size_x", "size_y", "d11", "d22", "d66", "mass_per_area")
         more = ("tension_x", "tension_y", "clip_radius", "air_density", "edge_loss")
-        if not self.frame_width >= 0:
-            raise ValueError(f"frame_width = {self.frame_width} m of a plate must be 0 or above")
         check_numbers("a plate", self, *more, least="0 or above")
+        if not self.frame_width >= 0:  # inf is allowed
+            raise ValueError(f"frame_width = {self.frame_width} m of a plate must be 0 or above")
         if not self.d12**2 < self.d11 * self.d22:
             raise ValueError(
                 f"d12 = {self.d12} of a plate is not below sqrt(d11 d22) = "
@@ -278,9 +278,12 @@ def _chunks(lines: Ints) -> list[Ints]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Coupled:
-    """Coupled modes of a family at angular frequencies `w` (f,): dynamic stiffnesses `own` (f, m)
-    of each mode, `added` (f,) times `bending` (m, m) without its diagonal, and the `sound` (f, q,
-    q) of `patterns` (q, m), of which `own` has the diagonals `alone` (f, m).
+    """Coupled modes of a family, of `squared` (m,) natural frequencies, at angular frequencies `w`
+    (f,).
+
+    `own` (f, m) are the dynamic stiffnesses of each mode alone. Modes are coupled by `added` (f,)
+    times `bending` (m, m), whose diagonal is 0, and by patterns^T sound patterns with `patterns`
+    (q, m) and `sound` (f, q, q). The diagonals of that, `alone` (f, m), are part of `own`.
     """
 
     squared: Floats

@@ -2,7 +2,7 @@
 
 Near a resonance, the small excess stiffness of a mesh changes the waveform much more than
 elsewhere. Soft or thin bodies need more elements than stiff ones. The error of each mesh in a
-sequence is extrapolated from the change since the previous mesh, and a controller chooses the next
+sequence is extrapolated from the change since a coarser mesh, and a controller chooses the next
 size. All axes are refined alike, because a slab has few layers of cells and one more layer changes
 the result as much as the refinement along the surface.
 """
@@ -25,7 +25,7 @@ from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Array, Floats
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
-# The same for hands, of which two close meshes differ by chance more than by their sizes.
+# The same for hands: two of their meshes with close sizes differ more by chance than by the sizes.
 FIRST_HAND, RATIO_HAND = 2.4, 1.7
 FINEST = 0.4  # of the default element size: the finest that is tried
 STILL = 1e-6  # of the waveforms: weaker motion about their mean is round-off
