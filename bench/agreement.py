@@ -321,9 +321,8 @@ def outcome(
         return result
     responses: dict[str, Response] = {}
     for name in only or [each for each in models.names() if each not in KERNELS]:
-        started = time.process_time()
         try:
-            responses[name] = _response(parsed, name, started + slowest)
+            responses[name] = _response(parsed, name, slowest)
         except TooSlow:
             result.slow.append(name)
         except (ValueError, Diverged) as error:
@@ -335,14 +334,21 @@ def outcome(
     return result
 
 
-def _response(scene: Scene, model: str, until: float) -> Response:
+def limited(seconds: float) -> Callable[[str, float], None]:
+    """Return a progress callback that raises TooSlow after some seconds of CPU time from now."""
+    until = time.process_time() + seconds
+
     def watch(phase: str, fraction: float) -> None:
         if time.process_time() > until:
             raise TooSlow
 
+    return watch
+
+
+def _response(scene: Scene, model: str, seconds: float) -> Response:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", skinwave.SkinwaveWarning)
-        return skinwave.simulate(scene, model, TOLERANCE, watch)
+        return skinwave.simulate(scene, model, TOLERANCE, limited(seconds))
 
 
 def _pairs(responses: dict[str, Response]) -> Iterator[Pair]:

@@ -53,6 +53,7 @@ DISTINCT = 1e-6  # of the largest singular value: probes that differ by less are
 ROUND_OFF = 1e-12  # of a direction: a smaller remainder after orthogonalisation is round-off
 DEPENDENT = 1e-10  # squared sine below which a direction is not new
 ALIKE = 1e-6  # squared sine below which directions are orthonormalised once more
+LEFT = 0.3  # of the tolerance: error of weak start vectors that have no more moments
 AT_ONCE = 32  # vectors multiplied together
 # Rows of tall matrices per inner product, so that they stay in the processor's cache: 100 by 5
 # inner products of 128,000 rows take 5.5 ms, and 18 ms by one multiplication.
@@ -71,6 +72,8 @@ def reduce(
     *,
     loads: Floats | None = None,
     air: Air | None = None,
+    weighted: bool = False,
+    rate: int = 0,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> ReducedModel:
@@ -86,6 +89,10 @@ def reduce(
     loads : (3 n, k) float, typical nodal forces for the error estimate. Without them, the error is
         that of the probes' adjoint fields in the whole body, which needs far more moments.
     air : around a sheet, from `air_around`; the body must then be constrained
+    weighted : whether the sizes of the probes' rows count, as in a `load_subspace`. The basis then
+        follows weak ones, and frequencies with a weak response, only as far as the tolerance of
+        the strongest response needs
+    rate : order of the time derivative of the response that is meant, 1 for velocity
     solver : backend of `factorise`
     progress : called with the fraction done as the error estimate approaches the tolerance
 
@@ -121,12 +128,12 @@ def reduce(
     factor = factorise(laws.dynamic_stiffness(factors, operators.K, operators.M), backend=solver)
     report(0.0)
 
-    independent = _independent(start_vectors)
+    independent, directions = _independent(start_vectors)
     space = KrylovBasis(operators, laws, independent.shape[1] * (MOST_MOMENTS + 1))
     rows = start_vectors if loads is None else np.hstack([start_vectors, loads[free]])
     growing = _moments(space, operators, laws, point, factor, independent)
     moments, size, estimate = _iterate(
-        space, rows, start_vectors.shape[1], band, tolerance, growing, report
+        space, rows, directions, band, tolerance, growing, report, weighted, rate
     )
 
     backend = factor.backend
@@ -151,12 +158,13 @@ def reduce(
 
 def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
     """Return a proper orthogonal basis (3 n, s) of loads (3 n, k) to a relative error in the
-    2-norm. A circling focus needs about twenty vectors at 1e-3.
+    2-norm, each vector as large as its part of the loads. A circling focus needs about twenty
+    vectors at 1e-3.
     """
     squares, vectors = np.linalg.eigh(loads.T @ loads)
     truncated = np.sqrt(np.cumsum(np.maximum(squares, 0)) / squares.sum())
     needed = truncated > tolerance
-    return loads @ (vectors[:, needed] / np.sqrt(squares[needed]))
+    return loads @ vectors[:, needed]
 
 
 class KrylovBasis:
@@ -178,6 +186,7 @@ class KrylovBasis:
         self._small_rests: list[Any] = [None if r is None else self._small_K for r in self._rests]
         self._rows = np.empty((0, 0))
         self.size = 0
+        self.followed: int | None = None  # vectors of a moment that have a next one, if not all
 
     @property
     def basis(self) -> Floats:
@@ -270,13 +279,20 @@ class KrylovBasis:
 def _iterate(
     space: KrylovBasis,
     rows: Floats,
-    probes: int,
+    directions: Floats,
     band: float,
     tolerance: float,
     growing: Iterable[tuple[int, int]],
     report: Callable[[float], None],
+    weighted: bool,
+    rate: int,
 ) -> tuple[int, int, float]:
-    """Return moments, vectors and error of the first model within the tolerance."""
+    """Return moments, vectors and error of the first model within the tolerance.
+
+    The rows begin with those of the probes; `directions` (p, k) combine these to the vectors of a
+    moment.
+    """
+    probes, left = len(directions), 0.0
     # Not 0 Hz itself, where an unconstrained body has no finite response.
     fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, FREQUENCIES), np.complex128)
     coarse = fine[::COARSE_STEP]  # until the error is below the tolerance there
@@ -286,12 +302,20 @@ def _iterate(
             continue
         at = moments
         space.project(rows, size)
-        now = _band_response(space, probes, coarse, size)
+        now = _band_response(space, probes, coarse, size) * np.abs(coarse[:, None, None]) ** rate
         if response is not None:
-            error = _largest_change(response, now)
+            error = np.hypot(_largest_change(response, now, weighted), left)
             if error <= tolerance:
-                both = (_band_response(space, probes, fine, each) for each in (before[1], size))
-                error = _largest_change(*both)
+                earlier, latest = (
+                    _band_response(space, probes, fine, each) * np.abs(fine[:, None, None]) ** rate
+                    for each in (before[1], size)
+                )
+                error = np.hypot(_largest_change(earlier, latest, weighted), left)
+            if weighted:
+                each = _changes(response, now, weighted, directions)[:, : space.followed]
+                ends = np.sqrt(np.cumsum(each[:, ::-1] ** 2, axis=1)).max(axis=0)[::-1]
+                space.followed = int(np.count_nonzero(np.hypot(ends, left) > LEFT * tolerance))
+                left = float(np.hypot(left, ends[space.followed :].max(initial=0.0)))
             first = error if first == np.inf else first
             report(max(0.0, np.log(error / first) / np.log(tolerance / first)))
             if error <= tolerance:
@@ -311,13 +335,15 @@ def _expansion(operators: Operators, air: Air | None, band: float) -> tuple[floa
     return 0.0, replace(operators, M=aslinearoperator(operators.M) + air.mass)
 
 
-def _independent(start_vectors: Floats) -> Floats:
-    """Return independent unit directions of vectors (n, p): probes on a clamped edge do not move,
-    and probes in one element may be linearly dependent.
+def _independent(start_vectors: Floats) -> tuple[Floats, Floats]:
+    """Return independent unit directions (n, d) of vectors (n, p), the strongest first, and the
+    unit combinations (p, d) that they are: probes on a clamped edge do not move, and probes in one
+    element may be linearly dependent.
     """
     squares, directions = np.linalg.eigh(start_vectors.T @ start_vectors)
     distinct = squares > DISTINCT**2 * squares[-1]
-    return start_vectors @ (directions[:, distinct] / np.sqrt(squares[distinct]))[:, ::-1]
+    directions = directions[:, distinct][:, ::-1]
+    return start_vectors @ (directions / np.sqrt(squares[distinct])[::-1]), directions
 
 
 def _moments(
@@ -342,6 +368,7 @@ def _moments(
     for moment in range(1, MOST_MOMENTS + 1):
         yield moment, space.size
         earlier, latest = _orthonormalise(earlier, latest)
+        latest = latest[:, :, : space.followed]
         y, y_before, *y_relaxed = latest
         stretches = [lag * part for lag, part in zip(lags, y_relaxed, strict=True)]
         direct, of_mass, of_rests = laws.without_stiffness(
@@ -423,8 +450,19 @@ def _band_response(space: KrylovBasis, probes: int, s: Complex, size: int) -> Co
     return np.array([loads.T @ x if loads.shape[1] else x for x in fields])
 
 
-def _largest_change(before: Complex, now: Complex) -> float:
-    """Return the largest relative change at any frequency."""
+def _largest_change(before: Complex, now: Complex, of_all: bool) -> float:
+    """Return the largest relative change at any frequency; `of_all` is as in `_changes`."""
+    return float(np.linalg.norm(_changes(before, now, of_all), axis=1).max())
+
+
+def _changes(
+    before: Complex, now: Complex, of_all: bool, directions: Floats | None = None
+) -> Floats:
+    """Return the change (f, d) at each frequency by probe, or by combinations (p, d) of probes,
+    over the response at that frequency or, with `of_all`, the strongest at any.
+    """
     change = now.copy()
     change[:, : before.shape[1]] -= before
-    return float((np.linalg.norm(change, axis=(1, 2)) / np.linalg.norm(now, axis=(1, 2))).max())
+    change = change if directions is None else change @ directions
+    size = np.linalg.norm(now, axis=(1, 2))
+    return np.linalg.norm(change, axis=1) / (size.max() if of_all else size[:, None])

@@ -41,15 +41,16 @@ UNEVEN = 1e-6  # of a sampling interval: largest deviation of equal steps
 class Effort:
     """Cost of a response, and how it was computed.
 
-    `seconds` by phase; `dofs` and number of `steps` or lines that were solved; `peak_memory` in
-    bytes; element size `h` in m and time step `dt` in s, 0 if there is none; SHA-256 of the `mesh`;
-    `solver`; `estimate` of the relative error of the reduction; relative `energy_imbalance`; share
-    of the losses that was `radiated` through absorbing boundaries; `versions` of the software;
-    `errors`, the statement of the expected error; `warnings`, distinct sentences on the limits of
-    the result.
+    `seconds` by phase; `cells` of the whole mesh, also if a half is modelled; `dofs` and number of
+    `steps` or lines that were solved; `peak_memory` in bytes; element size `h` in m and time step
+    `dt` in s, 0 if there is none; SHA-256 of the `mesh`; `solver`; `estimate` of the relative error
+    of the reduction; relative `energy_imbalance`; share of the losses that was `radiated` through
+    absorbing boundaries; `versions` of the software; `errors`, the statement of the expected error;
+    `warnings`, distinct sentences on the limits of the result.
     """
 
     seconds: Mapping[str, float] = field(default_factory=dict)
+    cells: int = 0
     dofs: int = 0
     steps: int = 0
     reduced_dofs: int = 0

@@ -16,6 +16,7 @@ from shares import dealt
 
 import meshes
 from meshes import subprocess_call
+from skinwave.commands import kept
 from skinwave.commands.cli import main
 from skinwave.verify import elements
 
@@ -37,10 +38,13 @@ def pytest_collection_modifyitems(config, items):
 
 @pytest.fixture(scope="session", autouse=True)
 def fresh_cache(tmp_path_factory):
-    """Cold cache of the tests, whatever this machine has cached before; workers share it."""
+    """Cold cache of the tests, whatever this machine has cached before; workers share it. Commands
+    compute, also if an earlier test had the same result.
+    """
     base = tmp_path_factory.getbasetemp()
     base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
     os.environ["SKINWAVE_CACHE"] = str(base / "cache")
+    kept.COMMANDS = ()
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from meshes import Palm
-from meshes.shapes.structured import Lines
 from simple_model.choices import choose
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.dispersion import DispersionCurves
@@ -288,7 +287,6 @@ class BodyKind:
         to the layers, so that matrices are sums of few terms
     equivalent : thickness in m of the mesh that represents all thinner bodies, with equivalent
         modulus and density (`sheet.bending_equivalent`)
-    grid_lines : grid lines (n,) in m along x, y and z for an element size in m
     check_size : raises a ValueError for an element size in m that gives too many elements
     default_size : default element size, m
     interactive_size : element size in m for a response within seconds and errors of a few per cent
@@ -304,6 +302,7 @@ class BodyKind:
     may_be_layered : whether it may have layers
     actual_size : element size in m of a mesh with whole numbers of cells
     conforming : whether the elements follow its layers
+    is_smooth : whether its supports begin smoothly, without edges at which strain is singular
     may_be_coated : whether layers thinner than elements can become a coat
     normal_patch : m, standard deviation of the area around a probe over which the normal, the
         direction of its motion, is averaged; 0 for the normal at the probe
@@ -317,7 +316,6 @@ class BodyKind:
     discretise: Callable[[Body, float], Discretised] | None = None
     morph: Callable[[Body, Body, float], Discretise] | None = None
     equivalent: Callable[[Body], float] | None = None
-    grid_lines: Callable[[Body, float], Lines] | None = None
     check_size: Callable[[Body, float], None] = lambda body, h: None
     default_size: Callable[[Body], float] = lambda body: min(body.width, body.height) / 20
     interactive_size: float = 4.5e-3
@@ -332,6 +330,7 @@ class BodyKind:
     may_be_layered: bool = True
     actual_size: Callable[[Body, float], float] | None = None
     conforming: bool = False
+    is_smooth: bool = False
     may_be_coated: bool = False
     normal_patch: float = 0.0
 

@@ -78,10 +78,10 @@ PALM = register(
         check=lambda body: body.palm,
         check_size=lambda body, h: check_size(len(line) - 1 for line in grid_lines(body, h)),
         discretise=discretise,
-        grid_lines=grid_lines,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,
         named_sides=("front", "back"),
+        is_smooth=True,
         may_be_coated=True,
         dispersion=stack_dispersion,  # of a slab as deep as the middle of the palm
     )

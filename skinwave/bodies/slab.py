@@ -128,7 +128,6 @@ SLAB = register(
         },
         discretise=discretise,
         morph=morph,
-        grid_lines=grid_lines,
         check_size=lambda body, h: check_size(len(line) - 1 for line in slab_grid_lines(body, h)),
         default_size=lambda body: min(SLAB_CELL, body.depth / 2),
         compliance=lambda body: layered(stack(body)),

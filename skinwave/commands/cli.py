@@ -13,12 +13,15 @@ from typing import Any, NoReturn
 import skinwave
 from skinwave.commands import COMMANDS
 from skinwave.commands.common import note_scenes
+from skinwave.commands.kept import run_or_recall
 from skinwave.system import extensions
 from skinwave.system.plain_text import printable, say
 from skinwave.system.processes import SAFE_PATH, environment
 
 CACHE = "SKINWAVE_CACHE"
-NO_CACHE = f"do not read or write the cache of meshes and bodies, whose folder {CACHE} sets"
+NO_CACHE = (
+    f"do not read or write the cache of meshes, bodies and results, whose folder {CACHE} sets"
+)
 UNCACHED = ("convert",)  # commands that do not use the cache
 READER_GONE = 141  # 128 + SIGPIPE, the exit code of `yes` in `yes | head -1`
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -59,7 +62,7 @@ def _command(typed: list[str]) -> int:
     no_cache = {CACHE: ""} if getattr(options, "no_cache", False) else {}
     with environment({**SAFE_PATH, **no_cache}):
         note_scenes(options)
-        return int(options.command(options))
+        return run_or_recall(options)
 
 
 def _message(error: Exception) -> str:
@@ -115,8 +118,8 @@ def parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="skinwave",
         description="Simulate waves in skin and paper under mid-air ultrasound haptics.",
-        epilog=f"The environment variable {CACHE} names the folder of cached meshes and reduced "
-        "bodies (at most 5 GiB; an empty value turns the cache off).",
+        epilog=f"The environment variable {CACHE} names the folder of cached meshes, reduced "
+        "bodies and results (at most 5 GiB; an empty value turns the cache off).",
     )
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(dest="command_name", metavar="COMMAND")

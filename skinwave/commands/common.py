@@ -183,7 +183,8 @@ def result_folder(
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
 
-    options.out = options.out or Path(default)
+    options.default_out = Path(default)
+    options.out = options.out or options.default_out
     with output_folder(options.out, overwrite=options.overwrite, inputs=inputs) as folder:
         with progress_of(options) as progress:
             yield folder, progress
@@ -214,7 +215,8 @@ def with_failures(failures: Mapping[str, str] | None, sentences: Iterable[str]) 
 
 
 def summarise(options: argparse.Namespace, summary: dict[str, Any], text: str) -> None:
-    """Print a text, or the summary as JSON."""
+    """Print a text, or the summary as JSON; keep both in the options."""
+    options.summary = summary, text
     if options.json:
         say(json.dumps(summary))
     elif not options.quiet:

@@ -41,19 +41,28 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
     from skinwave.planning.simulate import solve
+    from skinwave.report import renderer
     from skinwave.results import record
     from skinwave.results.run import Run
     from skinwave.scene.file import read
     from skinwave.scene.scene import body_name
     from skinwave.scene.spreads import spreads_of
     from skinwave.studies.pages import write_run_page
+    from skinwave.studies.surfaces import begin_surface
     from skinwave.sweeps.sampling import check
+    from skinwave.system.processes import pool
 
     scene = read(options.scene)
     if options.samples is not None:
         check(spreads_of(scene), options.samples, options.seed)
     inputs = [options.scene, scene.body.file]
-    with result_folder(options, f"{options.scene.stem}-out", inputs) as (folder, progress):
+    with (
+        result_folder(options, f"{options.scene.stem}-out", inputs) as (folder, progress),
+        pool(1) as workers,
+    ):
+        moved = begin_surface(scene, solving(options, progress, model=options.model), workers)
+        if moved:
+            renderer.begin()
         plan = plan_of_command(options, scene, progress=progress)
         response = solve(scene, plan)
         warn(w for w in response.effort.warnings if w not in plan.warnings)
@@ -62,8 +71,9 @@ def run(options: argparse.Namespace) -> int:
         if options.samples:
             more = _uncertainty(options, run, plan.h, folder, progress)
         command = record.command_entry(options)
-        solving_map = solving(options, progress, model=response.model)
-        failures = write_run_page(folder, run, more, command["typed"], options=solving_map)
+        failures = write_run_page(
+            folder, run, more, command["typed"], moved=moved, workers=workers, progress=progress
+        )
         record.write(folder, command, scene=scene, response=response)
     effort = response.effort
     summary = {

@@ -87,6 +87,7 @@ def with_cost(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
     return replace(
         effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
         mesh=cache.digest(build.mesh.points, build.mesh.tets),
+        cells=len(build.mesh.tets) << len(build.symmetry),
     )  # fmt: skip
 
 

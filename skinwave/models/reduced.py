@@ -8,7 +8,7 @@
     u(t) = Re sum_f lines exp(2 pi i f t) + Re sum_m start exp(pole t)
 
 A body is reduced either for its probes, to compute their waveforms under any load, or for the load
-of one path, to compute the motion of the whole body.
+of one path, to compute the motion of many probes or of the whole body.
 """
 
 from dataclasses import dataclass, replace
@@ -20,12 +20,14 @@ from scipy import sparse
 
 import fem
 from fem.energy import mean_power
+from fem.krylov import load_subspace
 from fem.maxwell import maxwell_only
 from fem.reduced import exponential_sum, impulse_response, line_response
 from meshes import cache
 from meshes.records import decode, encode
 from simple_model import Effort, Material, MovingPressure, Response
 from simple_model.load.focus import spot_width
+from simple_model.load.path_cells import path_samples
 from simple_model.load.sampling import below_half_the_rate, highest_driving
 from simple_model.load.spectrum import merge_lines, reduced_lines, synthesise
 from simple_model.quantities import Quantity
@@ -50,7 +52,9 @@ from skinwave.typing import Bools, Floats
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = "reduced 11"  # of a cached body
+FORMAT = "reduced 12"  # of a cached body
+MANY_OUTPUTS = 24  # from where a body is reduced for one path, whose load has about as many parts
+PATH_SHARE = 3  # of that tolerance: error of the load along a path
 NEGLIGIBLE_LINE_RATIO = 1e-7  # to the strongest line at the probes
 
 
@@ -71,8 +75,9 @@ class ReducedBody:
 
     The `probes` (p, 2) in m read the quantity of `reading`. Its components at rest are `read`
     (p c, r) of the coordinates, `sag` (p c,) under gravity, and `translation` (p c,) for 1 m of
-    support motion. The materials of the probes are `solids`, if the quantity depends on them. The
-    `effort` is that of the offline stage.
+    support motion. The materials of the probes are `solids`, if the quantity depends on them. If
+    the body is reduced for one path, `path` identifies it. The `effort` is that of the offline
+    stage.
     """
 
     poles: fem.Poles
@@ -90,6 +95,7 @@ class ReducedBody:
     translation: Floats | float = 0.0
     reading: Reading = SURFACE
     solids: tuple[Material, ...] = ()
+    path: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,6 +124,7 @@ def prepare(
     symmetry: str = "",
     reduction: float | None = None,
     discretise: Discretise | None = None,
+    own_path: bool = False,
 ) -> ReducedBody:
     """Mesh, assemble, factorise and reduce the body of a scene, once for all Tactons and, by the
     cache, once per machine.
@@ -125,7 +132,8 @@ def prepare(
     If all probes lie on a symmetry plane of the body, one half is modelled. `symmetry`, the axes
     across which all loads are symmetric, applies to normal motion under a pressure. `reduction` is
     the relative error of the reduction, by default `reduction_tolerance` of the options, and
-    `discretise` replaces the mesh of the body's kind.
+    `discretise` replaces the mesh of the body's kind. With `own_path`, a body with many outputs is
+    reduced for the path of the scene's focus only.
     """
     clock, report, solver = Clock(), options.progress, options.solver
     probes, reading, load = scene.probe_points, scene.reading, scene.load
@@ -136,13 +144,21 @@ def prepare(
     build = meshed.mesh_body(body, options.h, clock, silent, symmetry, discretise)
     outputs, solids = meshed.probe_rows(body, build, meshed.images(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
-    name = entry_name(body, build, probes, solver, tolerance, outputs=own, load=load)
+    along = scene.loads[0] if own_path and outputs.shape[0] > MANY_OUTPUTS else None
+    path = path_key(along) if along else ""
+    name = entry_name(
+        body, build, probes, solver, tolerance, outputs=own, load=load,
+        path=f"{path} {reading.record.rate}" if along else "",
+    )  # fmt: skip
     with clock("read from cache"):
         reduced = cached_record(name)
     if reduced is None:
         with one_thread():  # a second thread saves a tenth of the time, and rounds differently
-            reduced = _prepare(body, build, outputs, clock, report, solver, tolerance, load)
-        reduced = replace(reduced, probes=probes)
+            reduced = _prepare(
+                body, build, outputs, clock, report, solver, tolerance, load, along,
+                reading.record.rate if along else 0,
+            )  # fmt: skip
+        reduced = replace(reduced, probes=probes, path=path)
         store_record(name, reduced)
     # Another size may have made the same mesh.
     effort = meshed.with_cost(reduced.effort, clock, build, options.h or default_size(body))
@@ -173,6 +189,7 @@ def entry_name(
     *,
     outputs: sparse.csr_array | None,
     load: Load = PRESSURE,
+    path: str = "",
 ) -> str:
     """Return the cache key of everything that a reduced body depends on; `outputs` (p c, 3 n) are
     None for normal motion at the surface.
@@ -188,13 +205,27 @@ def entry_name(
         FORMAT, *Effort.__dataclass_fields__, body, mesh.points, mesh.tets, mesh.region, *facets,
         build.material, build.symmetry, build.fixed, build.absorbing, build.coat, build.drag,
         build.held, build.tension, *support, probes, BAND, tolerance, solver_name(solver),
-        versions(), *read, replace(load, support_motion=None), direction,
+        versions(), *read, replace(load, support_motion=None), direction, path,
     )  # fmt: skip
+
+
+def path_key(pressure: MovingPressure) -> str:
+    """Return what identifies the path of a focus and its spot."""
+    return cache.digest(path_samples(pressure).round(9), pressure.profile, pressure.height)
+
+
+def path_loads(
+    P: sparse.csr_array, points: Floats, pressure: MovingPressure, tolerance: float
+) -> Floats:
+    """Return nodal forces (3 n, s) that span the load along a path to a tolerance."""
+    return load_subspace(
+        meshed.spread(P, pressure.spot(points, path_samples(pressure)).T), tolerance
+    )
 
 
 def _prepare(
     body: Body, build: Build, outputs: sparse.csr_array, clock: Clock, report: Progress,
-    solver: str, tolerance: float, load: Load,
+    solver: str, tolerance: float, load: Load, along: MovingPressure | None, rate: int,
 ) -> ReducedBody:  # fmt: skip
     operators = meshed.assemble(build, clock, report)
     with clock("factorise and reduce"):
@@ -202,11 +233,13 @@ def _prepare(
         P, points = meshed.even_part(*meshed.surface_load(build, load), build.symmetry)
         still = meshed.sag(build, operators, outputs, load, solver)
         motion = load.support_motion
+        loads = meshed.spread(P, typical_spots(body, points))
+        if along:
+            loads = path_loads(P, points, along, PATH_SHARE * tolerance)
         reduced, _ = reduce_body(
-            body, build, operators, outputs, tolerance, surface=(P, points),
-            loads=meshed.spread(P, typical_spots(body, points)),
+            body, build, operators, outputs, tolerance, surface=(P, points), loads=loads,
             inertia=meshed.inertia(build, motion.unit) if motion else None, solver=solver,
-            report=report,
+            report=report, from_loads=along is not None, rate=rate,
         )  # fmt: skip
     moved = outputs @ meshed.translation(build, motion.unit if motion else (0.0, 0.0, 0.0))
     return replace(reduced, sag=still, translation=moved)
@@ -232,20 +265,27 @@ def reduce_body(
     inertia: Floats | None = None,
     solver: str = "auto",
     report: Progress = silent,
+    from_loads: bool = False,
+    rate: int = 0,
 ) -> tuple[ReducedBody, fem.ReducedModel]:
     """Return the reduced body of a mesh and its operators, and its fem.ReducedModel with the basis.
 
     `outputs`, `loads`, `tolerance` and `solver` are as in `fem.reduce`; `surface` is the load
     operator (3 n, c k) with its points (k, 3), of `surface_load` or a part of them; `inertia`
-    (3 n,) the nodal forces per acceleration of a support that moves.
+    (3 n,) the nodal forces per acceleration of a support that moves. With `from_loads`, the basis
+    grows from the loads: by reciprocity they and the outputs change places. The tolerance is then
+    one of the strongest response, or of its time derivative of order `rate`.
     """
     P, points = surface
     if inertia is not None and loads is not None:  # with the same weight as all others
         size = np.linalg.norm(loads) / np.linalg.norm(inertia)
         loads = np.column_stack([loads, size * inertia])
+    start, others = outputs, loads
+    if from_loads and loads is not None:
+        start, others = sparse.csr_array(loads.T), outputs.toarray().T
     model = fem.reduce(
-        operators, outputs, BAND, tolerance, loads=loads, air=air(body, build, operators.free),
-        solver=solver, progress=partial(report, "reduce"),
+        operators, start, BAND, tolerance, loads=others, air=air(body, build, operators.free),
+        weighted=from_loads, rate=rate, solver=solver, progress=partial(report, "reduce"),
     )  # fmt: skip
     P = P.tocsr()
     loaded = np.flatnonzero(np.diff(P.indptr))  # a few of all dofs
@@ -253,8 +293,9 @@ def reduce_body(
         dofs=len(operators.free), reduced_dofs=model.basis.shape[1], solver=model.solver,
         factorisations=1, estimate=model.estimate,
     )  # fmt: skip
+    read = outputs @ model.basis if from_loads else model.outputs
     reduced = reduced_of(
-        model.operators, P[loaded].T @ model.basis[loaded], points, effort, read=model.outputs
+        model.operators, P[loaded].T @ model.basis[loaded], points, effort, read=read
     )
     still = np.zeros(model.basis.shape[1])
     return replace(reduced, inertia=still if inertia is None else inertia @ model.basis), model
@@ -323,6 +364,11 @@ def answer(
         raise ValueError(
             f"the body is reduced for {reduced.load.words}, not for {scene.load.words}; reduce it "
             "for the load of the scene"
+        )
+    if reduced.path and reduced.path != path_key(scene.loads[0]):
+        raise ValueError(
+            "the body is reduced for many probes and the path of another focus; reduce it for the "
+            "path of the scene"
         )
     clock, quantity = Clock(), reduced.reading.record
     times = sample_times(scene) if times is None else times

@@ -1,14 +1,12 @@
 """Expected error and warnings of a response that was computed on a given mesh.
 
-The error of a mesh is extrapolated from a coarser one, as in `refinement`. A requested element size
-is compared with the next coarser one. A default size is compared with one of twice the size, which
-costs a tenth as much and overestimates errors by up to a half.
+The error of a mesh is extrapolated from a coarser one, as in `refinement`.
 """
 
 from functools import lru_cache
 
 from simple_model import Response, Statement
-from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.bodies.sizes import default_size
 from skinwave.models import named
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare
@@ -16,12 +14,8 @@ from skinwave.planning import errors, refinement
 from skinwave.planning.extent import absorbing_error
 from skinwave.planning.plan import plan
 from skinwave.planning.plan_warnings import response_warnings, stated
-from skinwave.scene.scene import Body, Scene, without_tacton
+from skinwave.scene.scene import Scene, without_tacton
 from skinwave.typing import Array
-
-Coarser = tuple[float, ReducedBody]  # element size in m, and the body with it
-
-COARSE_RATIO = 2.0  # of the element size of the mesh to compare with, over a default one
 
 
 def assess(
@@ -30,25 +24,24 @@ def assess(
     moved: ReducedBody | Array,
     options: SolveOptions = DEFAULT,
     *,
-    compared: Coarser | None = None,
-    meshed: Body | None = None,
+    compared: ReducedBody | None = None,
 ) -> Response:
     """Return a response of linear elements with its expected error and all warnings.
 
     `moved` is the reduced body of the response, or the quantity of interest of another model:
-    waveforms (t, p), or the lines (f, p) of an unconstrained body. `compared` is another element
-    size in m and the body meshed with it; chosen here if not given. `meshed` is the body to which
-    both sizes belong, if nodes were moved to the scene's body.
+    waveforms (t, p), or the lines (f, p) of an unconstrained body. `compared` is the
+    body on another mesh, chosen here if not given.
     """
     if isinstance(moved, ReducedBody):
         moved = refinement.quantity_of_interest(moved, scene, response)
     body, tolerance = scene.body, options.tolerance
     size = options.h or default_size(body)
-    other, coarse = compared or coarser_body(scene, options)
-    same = coarse.effort.dofs == response.effort.dofs
-    fine = refinement.about_its_rest(scene, moved)
-    values = fine if same else refinement.quantity_of_interest(coarse, scene, answer(coarse, scene))
-    mesh = refinement.mesh_error(meshed or body, (other, size), (values, fine), same=same)
+    coarse = compared or coarser_body(scene, options)
+    ratio = refinement.refinement_ratio(body, coarse.effort, response.effort)
+    fine = values = refinement.about_its_rest(scene, moved)
+    if ratio != 1:
+        values = refinement.quantity_of_interest(coarse, scene, answer(coarse, scene))
+    mesh = refinement.mesh_error(scene, ratio, (values, fine))
     parts = errors.element_parts(
         scene, tolerance, size, mesh=mesh, reduction=response.effort.estimate,
         absorbing=absorbing_error(scene, body, options),
@@ -61,14 +54,13 @@ def assess(
 
 def coarser_body(
     scene: Scene, options: SolveOptions = DEFAULT, usual: float | None = None
-) -> Coarser:
-    """Return the element size in m that `assess` compares with, and the body on that mesh. The
-    `usual` size in m is that of a study, in place of the default size.
+) -> ReducedBody:
+    """Return the body on the mesh that `assess` compares with. The `usual` size in m is that of a
+    study, in place of the default size.
     """
-    body, h = scene.body, options.h
-    usual = usual or default_size(body)
-    other = refinement.comparison_size(body, h) if h else _coarser_size(body, usual)
-    return other, _prepare(without_tacton(scene), other, options.solver, options.tolerance)
+    size = options.h or usual or default_size(scene.body)
+    other = refinement.comparison_size(scene.body, size)
+    return _prepare(without_tacton(scene), other, options.solver, options.tolerance)
 
 
 def all_warnings(
@@ -85,15 +77,6 @@ def all_warnings(
         statement = planned.statement.with_parts(response.effort.errors.parts)
         warnings = (*statement.warnings, *planned.cautions)
     return (*warnings, *response_warnings(scene, response))
-
-
-def _coarser_size(body: Body, h: float) -> float:
-    """Return a size in m for a cheap comparison with a default size, if there is such a mesh."""
-    try:
-        check_mesh(body, COARSE_RATIO * h)
-    except ValueError:
-        return refinement.comparison_size(body, h)
-    return COARSE_RATIO * h
 
 
 @lru_cache(maxsize=4)  # of Tactons on the same bodies

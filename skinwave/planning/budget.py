@@ -24,7 +24,7 @@ from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
 from skinwave.models.relative_change import relative_changes
 from skinwave.planning.record import PlanRow
-from skinwave.planning.refinement import CONTROLLER, element_sizes
+from skinwave.planning.refinement import controller, element_sizes
 from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, spreads_of
@@ -165,6 +165,6 @@ def mesh_row(scene: Scene, h: float | None, error: float) -> PlanRow:
     )
     if h is not None and error > 0:
         coarsest = float(element_sizes(scene.body)[0])
-        size = min(CONTROLLER.size(h, error, ENOUGH * largest), max(coarsest, h))
+        size = min(controller(scene).size(h, error, ENOUGH * largest), max(coarsest, h))
         reason += f": elements of {significant(1e3 * size, 2)} mm are fine enough"
     return PlanRow(what="uncertainty", value=budget.spreads, reason=reason)

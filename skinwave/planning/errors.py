@@ -63,7 +63,7 @@ def element_parts(
     elements = f"elements of {1e3 * h:.3g} mm"
     cure = "use smaller elements"
     if tolerance < mesh < inf:
-        cure = f"use elements of about {1e3 * enough(scene.body, h, mesh, tolerance):.2g} mm"
+        cure = f"use elements of about {1e3 * enough(scene, h, mesh, tolerance):.2g} mm"
     if mesh == inf:
         elements += ", of which the file has only one mesh"
         cure = "provide a finer mesh and compare the results"

@@ -3,6 +3,7 @@
 Without GL libraries VTK ends the process that opens its first window, and raises no exception.
 """
 
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 
@@ -20,9 +21,21 @@ class Renderer:
     detail: str
 
 
-@cache
 def renderer() -> Renderer:
     """Return the renderer of this environment, tested once per process."""
+    return begin().result()
+
+
+@cache
+def begin() -> "Future[Renderer]":
+    """Begin the test, which takes more than a second, beside other work."""
+    with_one = ThreadPoolExecutor(1)
+    testing = with_one.submit(_test)
+    with_one.shutdown(wait=False)
+    return testing
+
+
+def _test() -> Renderer:
     try:
         name = subprocess_call.call(draw_sphere, timeout=TIMEOUT)
         return Renderer(is_available=True, detail=name)

@@ -13,12 +13,10 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from fem.krylov import load_subspace
 from fem.stress import SolidPart, nodal_strain, solid_parts
 from meshes import TetMesh, part
 from simple_model import Effort, Material, Response, Trajectory
 from simple_model.layers.tensors import hooke
-from simple_model.load.path_cells import path_samples
 from simple_model.load.spectrum import synthesise
 from simple_model.quantities import DISPLACEMENT, NORMAL, STRAIN, VECTOR, Quantity
 from skinwave.bodies.build import Build
@@ -29,7 +27,6 @@ from skinwave.models.meshed import (
     check_coat,
     mesh_body,
     probe_rows,
-    spread,
     surface_load,
     with_cost,
 )
@@ -40,6 +37,7 @@ from skinwave.models.reduced import (
     from_rest_at,
     in_motion,
     oscillating,
+    path_loads,
     read_at,
     reduce_body,
     respond,
@@ -150,11 +148,11 @@ def reduced_motions(
     for group in groups.values():
         with clock("factorise and reduce"):
             report("factorise", 0.0)
-            spots = group[0].pressure.spot(points, path_samples(group[0].loads[0]))
-            subspace = sparse.csr_array(load_subspace(spread(P, spots.T), tolerance / 10).T)
+            loads = path_loads(P, points, group[0].loads[0], tolerance / 10)
             reduced, model = reduce_body(
-                body, build, operators, subspace, tolerance, surface=(P, points),
-                solver=options.solver, report=report,
+                body, build, operators, sparse.csr_array(loads.T), tolerance, surface=(P, points),
+                solver=options.solver, report=report, from_loads=True,
+                rate=first.reading.record.rate,
             )  # fmt: skip
         basis = np.ascontiguousarray(model.basis)  # its rows are read a few at a time
         for scene in group:

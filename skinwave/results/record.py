@@ -17,7 +17,7 @@ FILE = "record.json"
 RESPONSES = "responses.npz"
 # Options that do not affect the result.
 REPORTING = ("command", "command_name", "out", "overwrite", "quiet", "json", "debug", "no_cache",
-             "typed", "scheduler")  # fmt: skip
+             "typed", "scheduler", "default_out", "summary")  # fmt: skip
 
 
 def command_entry(options: Namespace) -> dict[str, Any]:

@@ -6,7 +6,7 @@ contents and one picture. A reader chooses one Tacton's waveforms at a time, and
 
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,7 +24,6 @@ from simple_model.line_table import FREE
 from simple_model.numbers import interval, percent, significant
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.models import named
-from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report import description, render
 from skinwave.report.figures import REPORT, figure_file
@@ -45,16 +44,16 @@ from skinwave.results.propagation import NEAR, OUTSIDE, Component, Propagation, 
 from skinwave.results.run import Run
 from skinwave.results.views import View
 from skinwave.scene.file import dumps
+from skinwave.scene.scene import Scene
 from skinwave.studies import overview, tables
 from skinwave.studies.first_screen import (
     FirstScreen,
     effects_of,
     first_name,
     first_screen,
-    has_quick_map,
     with_kernels,
 )
-from skinwave.studies.surfaces import Surface, element_surfaces, played, quick_surface, views_of
+from skinwave.studies.surfaces import Found, Surface, quick_surface, views_of
 from skinwave.system.document import (
     Choice,
     Details,
@@ -104,7 +103,7 @@ SENSATION = (
 
 @dataclass(frozen=True, kw_only=True)
 class Gallery:
-    """Style of pictures, formats of figure files beside PNG, and processes that draw Tactons."""
+    """Style of pictures, formats of figure files beside PNG, and processes that draw."""
 
     style: Style = REPORT
     formats: Sequence[str] = ()
@@ -164,12 +163,13 @@ def page_of(
     runs = [run for group in groups.values() for run in group]
     failures = {} if failures is None else failures
     is_single = len(groups) == 1
+    at_rest = _begin_pictures(runs, gallery) if is_single else {}
     drawn = _drawn(figures or groups, gallery)
     progress("draw maps", 0.0)
     own = _first_parts(first, gallery) if first else []
     progress("draw maps", 0.5)
     spatial = _spatial_parts(first, gallery, failures) if first else []
-    shown = _body_parts(runs, gallery, failures) if is_single else []
+    shown = _body_parts(at_rest, gallery, failures)
     body = [*before, *shown, *_waveforms(drawn, len(groups), progress), *after]
     body += tables.claims_parts(evaluate(assessable_runs(runs)))
     effects = first.effects if first else effects_of(groups, lambda run: ())
@@ -205,21 +205,39 @@ def page_of(
     return Report(title, verdict, parts, efforts_of(runs), PICTURES, failures)
 
 
-def _body_parts(runs: Sequence[Run], gallery: Gallery, failures: dict[str, str]) -> list[Part]:
-    """Return the pictures of bodies that were computed by elements, or the reason why not."""
+def _begin_pictures(runs: Sequence[Run], gallery: Gallery) -> "dict[Run, Callable[[], Any]]":
+    """Return functions that return the pictures of bodies that were computed by elements, which
+    processes draw beside other work.
+    """
     meshed = [run for run in runs if named(run.model).default_size]
-    if meshed and not renderer().is_available:
+    if gallery.workers and renderer().is_available:
+        workers, style = gallery.workers, gallery.style
+        return {run: workers.submit(_body_picture, run.scene, style).result for run in meshed}
+    return {run: partial(_body_picture, run.scene, gallery.style) for run in meshed}
+
+
+def _body_picture(scene: Scene, style: Style) -> Any:
+    """Return the pixels of a body at rest."""
+    from skinwave.report.body_picture import body_picture  # slow to import
+
+    return body_picture(scene, style)
+
+
+def _body_parts(
+    at_rest: "Mapping[Run, Callable[[], Any]]", gallery: Gallery, failures: dict[str, str]
+) -> list[Part]:
+    """Return the pictures of bodies, or the reason why there are none."""
+    if at_rest and not renderer().is_available:
         return [Section("The body", [f"Its picture is left out: {renderer().detail}."])]
     parts: list[Part] = []
-    for run in meshed:
-        from skinwave.report.body_picture import body_picture, drawn_size  # slow to import
+    for run, drawn in at_rest.items():
+        from skinwave.report.body_picture import drawn_size  # slow to import
 
         with or_failed(failures, f"picture of {run.column} at rest"):
             size = significant(1e3 * drawn_size(run.scene.body), 2)
-            pixels = body_picture(run.scene, gallery.style)
             caption = f"{label(run.column)} {BODY_CAPTION} Elements in this picture: {size} mm."
-            name = "body" if len(meshed) == 1 else f"body-{run.column}"
-            parts.append(gallery.image(name, pixels, caption))
+            name = "body" if len(at_rest) == 1 else f"body-{run.column}"
+            parts.append(gallery.image(name, drawn(), caption))
     return [Section("The body", parts)] if parts else []
 
 
@@ -232,28 +250,26 @@ def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
 
 def write_run_page(
     folder: Path, run: Run, more: Sequence[Part] = (), command: str = "", *,
-    options: SolveOptions = DEFAULT,
+    moved: "Future[Found] | None" = None, workers: Executor | None = None,
+    progress: Progress = silent,
 ) -> dict[str, str]:  # fmt: skip
     """Write the folder of one run with its page, which may have more parts. Return the reasons of
     parts that failed.
+
+    `moved` is the surface of a body of elements, from `begin_surface`; `workers` draw.
     """
     fill(folder, run)
-    first, failures, progress = None, dict[str, str](), options.progress
+    first, failures = None, dict[str, str]()
     if run.is_motion and run.scene.load.is_plain:
         group = with_kernels(run)
         scenes = {each.column: each.scene for each in group}
         progress(f"map of {run.column}", 0.0)
-        if has_quick_map(run.scene):
-            found, failures = quick_surface(run, None)
-        else:
-            found, failures = element_surfaces(
-                run.column, {run.tacton: run.scene}, options, played(scenes)
-            )
+        found, failures = moved.result() if moved else quick_surface(run, None)
         surface = found.get((run.tacton, run.column), Surface())
         first = first_screen({run.tacton: group}, lambda _: surface.maps, views_of(scenes, found))
     title = f"{run.tacton} on {label(run.body)}: {run.model}"
     page_of(
-        title, {run.tacton: [run]}, first, Gallery(), after=more, command=command,
+        title, {run.tacton: [run]}, first, Gallery(workers=workers), after=more, command=command,
         progress=progress, failures=failures,
     ).write(folder)  # fmt: skip
     return failures

@@ -1,11 +1,13 @@
 """Surfaces of a page: maps of bodies and of the kernel, and views of all at the same times."""
 
 from collections.abc import Mapping
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from simple_model.load.tacton import repetition_frequencies
+from skinwave.models import named
 from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions
@@ -16,9 +18,17 @@ from skinwave.results.playback import played_part
 from skinwave.results.run import Run
 from skinwave.results.surface import element_map, grid, map_motions
 from skinwave.results.views import View, body_view, flat_view, kernel_view
-from skinwave.scene.scene import Scene, with_body
+from skinwave.scene import paper15
+from skinwave.scene.scene import Scene, body_name, with_body
 from skinwave.studies.assumptions import infinite
-from skinwave.studies.first_screen import Maps, beside_kernel, first_name, quick_maps
+from skinwave.studies.first_screen import (
+    Maps,
+    beside_kernel,
+    first_name,
+    has_quick_map,
+    quick_maps,
+)
+from skinwave.system.effort import silent
 from skinwave.system.failures import or_failed
 
 Part = tuple[float, int]  # the duration in s and the number of frames that a view shows
@@ -33,6 +43,7 @@ class Surface:
 
 
 Surfaces = dict[tuple[str, str], Surface]  # by Tacton and column
+Found = tuple[Surfaces, dict[str, str]]  # and the reasons of failed parts
 
 
 def played(scenes: Mapping[str, Scene]) -> Part:
@@ -42,7 +53,7 @@ def played(scenes: Mapping[str, Scene]) -> Part:
     return played_part(scene.pressure, fastest)
 
 
-def quick_surface(run: Run, part: Part | None) -> tuple[Surfaces, dict[str, str]]:
+def quick_surface(run: Run, part: Part | None) -> Found:
     """Return the map of a body whose surface needs no mesh, with a view if it has a `part`, and
     the reasons of failed parts.
     """
@@ -58,7 +69,7 @@ def quick_surface(run: Run, part: Part | None) -> tuple[Surfaces, dict[str, str]
 
 def element_surfaces(
     column: str, scenes: Mapping[str, Scene], options: SolveOptions, part: Part
-) -> tuple[Surfaces, dict[str, str]]:
+) -> Found:
     """Return the maps of one meshed body under all Tactons, with a view of the first, and the
     reasons of failed parts.
     """
@@ -72,6 +83,23 @@ def element_surfaces(
             maps = beside_kernel(scene, element_map(scene, motion, *grid(scene)))
             surfaces[name, column] = Surface(maps=maps, view=view)
     return surfaces, failures
+
+
+def begin_surface(
+    scene: Scene, options: SolveOptions, workers: Executor
+) -> "Future[Found] | None":
+    """Begin the surface of a body of elements in a process, beside its response, or return None if
+    it needs no mesh or cannot be drawn.
+    """
+    has_motion = options.model == "auto" or named(options.model).needs_body
+    if not (scene.body.of_kind.discretise and has_motion and scene.load.is_plain):
+        return None
+    if has_quick_map(scene):
+        return None
+    part = played({SAME_LOAD.name: paper15.beside_kernels(scene)[SAME_LOAD.name]})
+    silently = replace(options, progress=silent)
+    column = body_name(scene.body)
+    return workers.submit(element_surfaces, column, {scene.name: scene}, silently, part)
 
 
 def views_of(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:

@@ -44,14 +44,13 @@ class Mesh:
     """Element sizes in m of the two meshes of a reduction: `h` for its runs, and `coarser` for
     their error; or the `error` that prevented them.
 
-    For a body of a `family`, also the `meshed` body, and the `values` of its free keys.
+    For a body of a `family`, also the `values` of its free keys.
     """
 
     h: float = 0.0
     coarser: float = 0.0
     error: str = ""
     family: Covering | None = None
-    meshed: Body | None = None
     values: Values = ()
 
 
@@ -152,10 +151,9 @@ def mesh_of_family(options: SolveOptions, family: Covering) -> Mesh:
     """
     size = options.h or refine(family.scene, family.hardest, options).h
     bodies = cached_shared_body(family, size, options.tolerance, options.solver).bodies
-    meshed = bodies.body(bodies.meshed)
-    coarser = comparison_size(meshed, size)
+    coarser = comparison_size(bodies.body(bodies.meshed), size)
     cached_shared_body(family, coarser, options.tolerance, options.solver)
-    return Mesh(h=size, coarser=coarser, family=family, meshed=meshed)
+    return Mesh(h=size, coarser=coarser, family=family)
 
 
 def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, Mesh]:
@@ -168,7 +166,7 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
     fine, coarse = _reduce_twice(scene, options, mesh)
     how = SolveOptions(tolerance=options.tolerance, h=mesh.h, solver=options.solver)
     response = assess(
-        scene, answer(fine, scene), fine, how, compared=(mesh.coarser, coarse), meshed=mesh.meshed
+        scene, answer(fine, scene), fine, how, compared=coarse
     )
     is_shared = mesh.family and not options.h
     if is_shared and response.expected_error > options.tolerance:

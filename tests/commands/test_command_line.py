@@ -14,6 +14,7 @@ from corpus import GOOD, SMALL
 
 from skinwave import BODIES
 from skinwave.bodies.sizes import check_mesh
+from skinwave.commands import kept
 from skinwave.commands.cli import main
 from skinwave.commands.common import progress_of
 from skinwave.scene import paper15
@@ -185,3 +186,42 @@ def test_a_size_too_fine_for_a_palm_names_one_that_works(scene, capsys):
         1
     ]
     check_mesh(BODIES["palm"], float(size) / 1e3)
+
+
+def test_an_unchanged_command_copies_its_result(scene, capsys, monkeypatch):
+    monkeypatch.setattr(kept, "COMMANDS", ("run",))
+    again = ["run", str(scene), "--model", "fem", "--element-size", "6"]
+    assert main([*again, "-o", "first"]) == 0
+    first = capsys.readouterr()
+    with monkeypatch.context() as without:
+        without.setattr("skinwave.commands.run.run", None)  # nothing may be computed
+        assert main([*again, "-o", "second"]) == 0
+    second = capsys.readouterr()
+    assert second.out == first.out.replace("first", "second")
+    assert "nothing has changed" in second.err
+    assert "--no-cache" in second.err
+    home = scene.parent
+    files = {p.relative_to(home / "first") for p in (home / "first").rglob("*") if p.is_file()}
+    assert len(files) > 5
+    for name in files:
+        old, new = ((home / each / name).read_bytes() for each in ("first", "second"))
+        if name.name == "record.json":
+            typed = json.loads(new)["command"]["typed"]
+            assert typed.endswith("-o second")
+        else:
+            assert new == old.replace(b"-o first", b"-o second")
+    assert main([*again, "-o", "second", "--overwrite"]) == 0  # every file is skinwave's own
+    scene.write_text(scene.read_text().replace("0.05", "0.06"))
+    with monkeypatch.context() as without:
+        without.setattr("skinwave.commands.run.run", Mock(return_value=3))
+        assert main([*again, "-o", "third"]) == 3  # another scene is computed
+
+
+def test_a_failed_command_is_not_kept(scene, monkeypatch):
+    monkeypatch.setattr(kept, "COMMANDS", ("run",))
+    again = ["run", str(scene), "--model", "point-kernel", "--quiet", "--overwrite"]
+    with monkeypatch.context() as failing:
+        failing.setattr("skinwave.studies.pages.fill", Mock(side_effect=ValueError("full")))
+        assert main(again) == 2
+    assert main(again) == 0
+    assert (scene.parent / "short-out/index.html").is_file()

@@ -47,6 +47,21 @@ def test_a_prepared_body_comes_from_the_cache_unchanged(tmp_path, monkeypatch):
     assert "reduce" in phases  # another mesh is another entry
 
 
+def test_a_body_with_many_probes_is_reduced_for_its_path():
+    few = Scene(pressure=MovingPressure(tacton=CIRCLE), body=SLAB, probes=ON_X)
+    places = np.random.default_rng(0).uniform(-0.015, 0.015, (60, 2))
+    many = replace(few, probes=ON_X + tuple(map(tuple, places.tolist())))
+    options = SolveOptions(h=0.012)
+    body = prepare(many, options, own_path=True)
+    assert body.effort.reduced_dofs < prepare(many, options).effort.reduced_dofs / 2
+    found, expected = (answer(b, s).values for b, s in ((body, many), (prepare(few, options), few)))
+    size = np.linalg.norm(expected, axis=0)
+    assert (np.linalg.norm(found[:, :3] - expected, axis=0) < 3e-3 * size).all()
+    other = replace(CIRCLE, trajectory=replace(PATH, size=0.01))
+    with pytest.raises(ValueError, match="path of another focus"):
+        answer(body, replace(many, pressure=MovingPressure(tacton=other)))
+
+
 def test_records_are_read_back_exactly_and_only_from_our_own_types():
     branch, arrays = fem.MaxwellBranch(K=np.eye(2) / 3, time=0.1), {}
     record = {"branches": (branch, None), ("a", 1): [2.5 - 1j, True, np.float64(0.1)]}

@@ -1,0 +1,122 @@
+"""Results of commands in the cache: an unchanged command copies what it wrote before.
+
+A result depends on the options of its command, the content of the files that these name, the code,
+and the versions of its libraries. Results with failed parts, and those of extensions, are not kept.
+"""
+
+import argparse
+import json
+import os
+import shlex
+import sys
+from datetime import datetime
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from skinwave.commands.common import summarise, warn
+from skinwave.system.extensions import VARIABLE
+from skinwave.system.plain_text import say
+
+COMMANDS = ("run", "compare", "relax", "report")
+LARGEST = 200_000_000  # bytes of a kept result
+
+
+def run_or_recall(options: argparse.Namespace) -> int:
+    """Run a command, or copy the result of the same command; return its exit code."""
+    if options.command_name not in COMMANDS:
+        return int(options.command(options))
+    from meshes import cache
+
+    name = _name(options) if cache.folder() else None
+    if name and (entry := cache.load(name)):
+        return _recall(options, entry.pop("meta"), entry)
+    code = int(options.command(options))
+    if name and code == 0:
+        _keep(name, options)
+    return code
+
+
+def _name(options: argparse.Namespace) -> str | None:
+    """Return the cache key of a command's result, or None if it is not kept."""
+    from meshes import cache
+    from skinwave.results import record
+    from skinwave.scene.file import read
+    from skinwave.system.effort import usable_cores, versions
+
+    given = record.command_entry(options)["options"]
+    if os.environ.get(VARIABLE) or ("source" in given and os.path.isdir(given["source"])):
+        return None
+    words = (value for value in given.values() if isinstance(value, str))
+    files = [Path(word) for word in words if os.path.isfile(word)]
+    try:
+        scenes = [read(path) for path in files if path.suffix == ".toml"]
+        files += [Path(scene.body.file) for scene in scenes if scene.body.file]
+        contents = [path.read_bytes() for path in files]
+    except (ValueError, OSError):  # the command itself says what is wrong
+        return None
+    code = [(str(p), p.stat().st_size, p.stat().st_mtime_ns) for p in _sources()]
+    return cache.key("result", options.command_name, given, contents, code, versions(),
+                     usable_cores())  # fmt: skip
+
+
+def _sources() -> list[Path]:
+    """Return the files of the code, and of the pages that it fills."""
+    root = Path(__file__).parents[2]
+    packages = ("fem", "meshes", "simple_model", "skinwave")
+    found = (path for name in packages for path in (root / name).rglob("*"))
+    return sorted(path for path in found if path.is_file() and path.suffix != ".pyc")
+
+
+def _keep(name: str, options: argparse.Namespace) -> None:
+    """Keep the folder and the summary of a command."""
+    import numpy as np
+
+    from meshes import cache
+    from skinwave.report.renderer import begin
+
+    is_incomplete = begin.cache_info().currsize and not begin().result().is_available
+    if is_incomplete or not hasattr(options, "summary") or not options.out.is_dir():
+        return
+    files = {path: path.read_bytes() for path in options.out.rglob("*") if path.is_file()}
+    if sum(map(len, files.values())) > LARGEST:
+        return
+    summary, text = options.summary
+    meta = {
+        "summary": summary, "text": text, "out": str(options.out), "typed": options.typed,
+        "default": str(options.default_out), "written": f"{datetime.now():%Y-%m-%d %H:%M}",
+    }  # fmt: skip
+    arrays = {
+        path.relative_to(options.out).as_posix(): np.frombuffer(content, np.uint8)
+        for path, content in files.items()
+    }
+    cache.store(name, meta, **arrays)
+
+
+def _recall(options: argparse.Namespace, meta: dict[str, Any], files: dict[str, Any]) -> int:
+    """Write a kept result to the place that the options name, and print its summary."""
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+
+    options.out = options.out or Path(meta["default"])
+    given = [value for value in vars(options).values() if isinstance(value, Path)]
+    inputs = [path for path in given if path != options.out]
+    with output_folder(options.out, overwrite=options.overwrite, inputs=inputs) as folder:
+        for name, content in files.items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content.tobytes())
+        command = record.command_entry(options)
+        said = record.read(folder) | {"command": command}
+        (folder / record.FILE).write_text(json.dumps(said, indent=1), encoding="utf-8")
+        page, before = folder / "index.html", escape(shlex.join(["skinwave", *meta["typed"]]))
+        if page.exists():
+            text = page.read_text(encoding="utf-8").replace(before, escape(command["typed"]))
+            page.write_text(text, encoding="utf-8")
+    warn(meta["summary"].get("warnings", ()))
+    if not (options.quiet or options.json):
+        say(f"skinwave: nothing has changed since {meta['written']}: the same result, from the "
+            "cache; --no-cache computes it again", sys.stderr)  # fmt: skip
+    summary = meta["summary"] | {"out": str(options.out), "from_cache": meta["written"]}
+    summarise(options, summary, meta["text"].replace(meta["out"], str(options.out)))
+    return 0
