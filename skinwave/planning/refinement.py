@@ -25,9 +25,11 @@ from skinwave.models.relative_change import NO_MOTION, relative_changes
 from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Array, Floats
 
-# Ratio of the sizes, and about that of the cells, of two meshes that are compared, because closer
-# ones differ more by chance; and of successive sizes of a refinement, at least.
-APART, CELLS_APART, STEP = 1.6, 1.45, 1.3
+# Ratio of the sizes of two meshes that are compared, because closer ones differ more by chance:
+# above the default size, and up to it, where cells far from the focus are as large in both.
+APART = 1.6, 2.0
+# Ratio of their cells along an axis; and of successive sizes of a refinement, at least.
+CELLS_APART, STEP = 1.45, 1.3
 COMPARABLE = 1.25, 1.75  # ratios of cells of meshes that are compared in any case
 LAST_STEP = 1.1  # to the finest mesh, at least
 # Of the default element size: the coarsest mesh of bodies whose elements follow their layers, and
@@ -106,7 +108,8 @@ def refine(
     check_mesh(body, h or default_size(body))
     sizes = element_sizes(body)
     size = h or first_size(meshed, sizes, tolerance)
-    before = comparison_size(body, h) if h else nearest_size(sizes[sizes > size], APART * size)
+    wanted = apart(body, size) * size
+    before = comparison_size(body, h) if h else nearest_size(sizes[sizes > size], wanted)
     solved = {before: solve(before)}
     while True:
         prepared, values = solve(size)
@@ -150,6 +153,11 @@ def first_size(scene: Scene, sizes: Floats, tolerance: float) -> float:
     return nearest_size(usable if len(usable) else sizes[-1:], wanted)
 
 
+def apart(body: Body, h: float) -> float:
+    """Return the ratio of the size of elements to compare with to h in m."""
+    return APART[1] if h <= default_size(body) * (1 + 1e-9) else APART[0]
+
+
 def nearest_size(sizes: Floats, wanted: float) -> float:
     """Return the size that is nearest to another by their ratio."""
     return float(sizes[np.abs(np.log(sizes / wanted)).argmin()])
@@ -191,9 +199,9 @@ def comparison_size(body: Body, h: float) -> float:
         return next(far, STEP * h)
     if not _has_cell_layers(body):
         largest = max(body.width, body.height) if body.of_kind.is_bounded else np.inf
-        return min(APART * h, COMPARED * max(coarsest_size(body), h), largest)
+        return min(apart(body, h) * h, COMPARED * max(coarsest_size(body), h), largest)
     layers = cell_layers(body, h)
-    other = min(layers - 1, round(layers / APART)) or 2
+    other = min(layers - 1, round(layers / apart(body, h))) or 2
     return _layered_size(body, other, min(h, body.depth) * layers / other)
 
 

@@ -6,6 +6,7 @@ COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz 
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -56,6 +57,7 @@ from skinwave.scene import paper15
 from skinwave.scene.file import dumps, read
 from skinwave.scene.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.system.document import worst_warnings
+from skinwave.system.effort import silent
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.json_kinds import EFFORT, PLAN, effort_of, fitting
 from skinwave.typing import Floats
@@ -156,19 +158,18 @@ def compute_views(
     """
     columns, progress = scene_columns(scene, beside), options.progress
     solving = replace(options, tolerance=PLANNED)
-    plans = {
-        column: plan(each, solving)
-        for column, each in columns.items() if each.body.of_kind.discretise
-    }  # fmt: skip
-    meshed = [column for column, each in columns.items() if _has_elements(each, options.h)]
+    meshed = {c: each for c, each in columns.items() if _has_elements(each, options.h)}
     moved: dict[str, BodyMotion] = {}
-    for column in meshed:
-        each, pictured = columns[column], f"pictures of {column}"
-        size = options.h or LARGER * default_size(each.body)
-        with or_failed(failures, pictured):
-            moved[column] = whole_motion(
-                each, replace(options, tolerance=REDUCTION_TOLERANCE, h=size)
-            )
+    with ThreadPoolExecutor(1) as beside_plans:
+        moving = {c: beside_plans.submit(_pictured, each, options) for c, each in meshed.items()}
+        plans = {
+            column: plan(each, solving)
+            for column, each in columns.items() if each.body.of_kind.discretise
+        }  # fmt: skip
+        for column, future in moving.items():
+            progress(pictured := f"pictures of {column}", 0.0)
+            with or_failed(failures, pictured):
+                moved[column] = future.result()
     tones = max(repetition_frequencies(scene.tacton).values(), default=0.0)
     fastest = max(map(fastest_line, moved.values()), default=tones)
     part = played_part(scene.pressure, fastest, frames)  # all views play the same part
@@ -197,6 +198,14 @@ def compute_views(
         yield view, own, plans[column]
     if plans and all(f"response of {column}" in failures for column in plans):
         raise ValueError(failure_text(failures))
+
+
+def _pictured(scene: Scene, options: SolveOptions) -> BodyMotion:
+    """Return the motion of a body for pictures."""
+    size = options.h or LARGER * default_size(scene.body)
+    return whole_motion(
+        scene, replace(options, tolerance=REDUCTION_TOLERANCE, h=size, progress=silent)
+    )
 
 
 def _reach(columns: Mapping[str, Scene], moved: Mapping[str, BodyMotion]) -> Floats:

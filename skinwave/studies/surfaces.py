@@ -85,9 +85,7 @@ def element_surfaces(
     return surfaces, failures
 
 
-def begin_surface(
-    scene: Scene, options: SolveOptions, workers: Executor
-) -> "Future[Found] | None":
+def begin_surface(scene: Scene, options: SolveOptions, workers: Executor) -> "Future[Found] | None":
     """Begin the surface of a body of elements in a process, beside its response, or return None if
     it needs no mesh or cannot be drawn.
     """

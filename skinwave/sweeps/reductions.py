@@ -165,9 +165,7 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
         raise ValueError(mesh.error)
     fine, coarse = _reduce_twice(scene, options, mesh)
     how = SolveOptions(tolerance=options.tolerance, h=mesh.h, solver=options.solver)
-    response = assess(
-        scene, answer(fine, scene), fine, how, compared=coarse
-    )
+    response = assess(scene, answer(fine, scene), fine, how, compared=coarse)
     is_shared = mesh.family and not options.h
     if is_shared and response.expected_error > options.tolerance:
         return on_mesh(scene, options, _mesh_or_error(mesh_of_body, options, scene))

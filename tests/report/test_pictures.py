@@ -22,17 +22,25 @@ from legible import illegible, sizes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from simple_model import MovingPressure, Tacton, Trajectory, pattern_period, published_load
+from simple_model import (
+    MovingPressure,
+    Response,
+    Tacton,
+    Trajectory,
+    pattern_period,
+    published_load,
+)
 from simple_model.quantities import DISPLACEMENT
 from skinwave.commands.cli import main
 from skinwave.models.options import SolveOptions
 from skinwave.report import body_picture, films, maps, render
-from skinwave.report.renderer import Renderer, renderer
+from skinwave.report.renderer import Renderer, begin, renderer
 from skinwave.report.spectra import levels_figure, tacton_figure
 from skinwave.report.styles import style
 from skinwave.results import exports, motion, playback, views
+from skinwave.results.run import Run
 from skinwave.results.surface import SurfaceField
-from skinwave.scene.file import dumps
+from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import BODIES, Body, Layer, Mounting, Placement, Scene, Sides
 from skinwave.studies import album, pages, report
 
@@ -276,11 +284,15 @@ def test_the_section_of_a_body_has_the_colours_of_its_legend(scene):
 
 
 def test_a_page_says_why_it_has_no_picture_of_the_body(monkeypatch):
-    run = SimpleNamespace(model="fem", column="palm")
+    response = Response(model="fem", times=np.arange(3.0), probes=np.zeros((1, 2)),
+                        values=np.zeros((3, 1)))  # fmt: skip
+    run = Run(tacton="", body="palm", scene=loads(""), response=response)
     monkeypatch.setattr(pages, "renderer", lambda: NO_GL)
-    (part,) = pages._body_parts([run], pages.Gallery(), {})
+    gallery = pages.Gallery()
+    (part,) = pages._body_parts({run: Mock()}, gallery, {})
     assert "apt install libegl1" in str(part)
-    assert pages._body_parts([SimpleNamespace(model="flat-body")], pages.Gallery(), {}) == []
+    flat = replace(run, response=replace(response, model="flat-body"))
+    assert pages._begin_pictures([flat], gallery) == {}
 
 
 @draws
@@ -432,7 +444,7 @@ def test_a_film_that_fails_is_left_out_by_name(monkeypatch):
 
 def test_a_crash_of_the_renderer_is_detected(monkeypatch):
     monkeypatch.setattr("skinwave.report.renderer.draw_sphere", os.abort)
-    found = renderer.__wrapped__()
+    found = begin.__wrapped__().result()
     assert not found.is_available
     assert "libegl1 libgl1-mesa-dri" in found.detail
 
