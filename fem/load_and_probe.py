@@ -271,14 +271,17 @@ def _candidates(facets: Floats, points: Floats) -> tuple[Ints, Ints]:
     low, high = hull.min(axis=1), hull.max(axis=1)
     slack = FACET_MARGIN * (high - low).max(axis=1, initial=0.0, keepdims=True)
     (left, below), (right, above) = (low - slack).T, (high + slack).T
-    pairs = [np.zeros((2, 0), np.intp)]
-    count = max(1, AT_ONCE // max(len(facets), 1))
-    for start in range(0, len(points), count):
-        x, y = points[start : start + count].T[:, :, None]
-        point, facet = np.nonzero((left <= x) & (x <= right) & (below <= y) & (y <= above))
-        pairs.append(np.stack([point + start, facet]))
-    point, facet = np.concatenate(pairs, axis=1)
-    return point, facet
+    order = np.argsort(points[:, 0])  # the points of each box by x are neighbours
+    first = np.searchsorted(points[order, 0], left, "left")
+    counts = np.searchsorted(points[order, 0], right, "right") - first
+    facet = np.repeat(np.arange(len(facets)), counts)
+    shift = np.arange(len(facet)) - np.repeat(np.cumsum(counts) - counts, counts)
+    point = order[np.repeat(first, counts) + shift]
+    y = points[point, 1]
+    inside = (below[facet] <= y) & (y <= above[facet])
+    point, facet = point[inside], facet[inside]
+    by_point = np.lexsort((facet, point))
+    return point[by_point], facet[by_point]
 
 
 def _facet_coordinates(facets: Floats, points: Floats) -> tuple[Floats, Bools]:

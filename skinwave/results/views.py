@@ -6,7 +6,7 @@ Motion is about its mean, because the mean pressure bends a sheet much more than
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -101,12 +101,12 @@ class View:
         """Places (s, 2) of the upper surface in m."""
         return self.points[self.surface, :2]
 
-    @property
+    @cached_property
     def inward(self) -> Singles:
         """Motion (f, s) of the upper surface into the body, in SI units."""
         return -self.motion[:, self.surface, 2]
 
-    @property
+    @cached_property
     def peak(self) -> float:
         """Largest motion into or out of the body, in SI units."""
         return float(np.abs(self.inward).max()) or 1.0

@@ -2,11 +2,14 @@
 
 import io
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from PIL import Image as Pillow
@@ -35,8 +38,9 @@ from skinwave.studies.album import Album, open_album, select_columns
 from skinwave.studies.first_screen import Maps, first_screen, with_kernels
 from skinwave.studies.pages import MARKS, Gallery, page_of, side_by_side
 from skinwave.system.document import Choice, Details, Part, Picture, Report, Section, inner_page
-from skinwave.system.effort import Progress
+from skinwave.system.effort import Progress, silent
 from skinwave.system.failures import or_failed
+from skinwave.system.processes import pool
 from skinwave.system.table import Table
 
 FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
@@ -78,21 +82,30 @@ def write_report(
     """
     failed = dict(failures or {})
     album = select_columns(open_album(results), columns)
-    gallery = Gallery(style=style, formats=formats)
+    with pool(1) as workers:
+        gallery = Gallery(style=style, formats=formats, workers=workers)
+        page = _page(album, gallery, out, progress, failed, command or _command(results))
+    page.write(out)
+    return failed
+
+
+def _page(
+    album: Album, gallery: Gallery, out: Path, progress: Progress, failed: dict[str, str],
+    command: str,
+) -> Report:  # fmt: skip
+    """Return the page, and write the data of its pictures."""
     before = [*picture_parts(album, gallery, progress, failed), *map_parts(album, gallery)]
     progress("write data", 0.0)
     _write_data(out / "data", album)
     groups = {name: _with_kernels(runs) for name, runs in album.groups.items()}
     scene = Details("The scene in words", [Table(["", ""], description.scene_rows(album.scene))])
     drawn_with = renderer().detail if renderer().is_available else "none"
-    page_of(
+    return page_of(
         album.title, album.groups, first_screen(groups, partial(_maps, album)), gallery,
         before=before, after=[scene, *_wave_parts(album, gallery, failed)],
-        modelled=_plan_parts(album), progress=progress, failures=failed,
-        command=command or _command(results),
+        modelled=_plan_parts(album), progress=progress, failures=failed, command=command,
         notes=[f"Renderer of three-dimensional pictures: {drawn_with}."],
-    ).write(out)  # fmt: skip
-    return failed
+    )  # fmt: skip
 
 
 def picture_parts(
@@ -105,7 +118,7 @@ def picture_parts(
     of_scene = [v for v in views if v.scene.body == album.scene.body and v.quantity.of_body]
     own = (of_scene or views)[-1]
     frame = int(np.abs(own.inward).max(axis=1).argmax())
-    options: dict[str, Part] = {}
+    options: dict[str, Any] = {}
     missing: list[Part] = []
     if renderer().is_available:
         options = _spatial_parts(own, frame, views, gallery, progress, failures)
@@ -115,6 +128,12 @@ def picture_parts(
     figure = maps.snapshots_figure(views, gallery.style)
     options["snapshots"] = gallery.figure("snapshots", figure, SNAPSHOTS)
     progress("draw snapshots", 0.5)
+    if isinstance(drawn := options.get("film"), Future):
+        progress("film", 0.0)
+        with or_failed(failures, "film"):
+            options["film"] = drawn.result()
+        if "film" in failures:
+            del options["film"]
     turned = inner_page(turntable(own, frame), f"{label(own.column)}. {TURNED}")
     return [Section("Pictures", [*missing, Choice("pictures", options), turned])]
 
@@ -122,14 +141,20 @@ def picture_parts(
 def _spatial_parts(
     own: View, frame: int, views: Sequence[View], gallery: Gallery, progress: Progress,
     failures: dict[str, str],
-) -> dict[str, Part]:  # fmt: skip
-    """Return three-dimensional pictures at a frame, and the film, without those that fail."""
-    parts: dict[str, Part] = {}
+) -> dict[str, Any]:  # fmt: skip
+    """Return three-dimensional pictures at a frame, and the film, without those that fail. With
+    workers, the film is drawn beside them.
+    """
+    parts: dict[str, Any] = {}
+    workers, style = gallery.workers, gallery.style
+    # Copies, because the originals keep what they compute while a thread sends them.
+    copies = replace(own), [replace(view) for view in views]
+    beside = workers.submit(_film, *copies, style, silent) if workers else None
     progress("draw side by side", 0.0)
     with or_failed(failures, "picture side by side"):
         parts["side by side"] = side_by_side(views, frame, gallery)
     with or_failed(failures, "film"):
-        parts["film"] = _film(own, views, gallery.style, progress)
+        parts["film"] = beside or _film(own, views, style, progress)
     if not len(own.tets):
         return parts
     with or_failed(failures, "picture cut open"):
