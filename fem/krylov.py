@@ -314,7 +314,8 @@ def _iterate(
             if weighted:
                 each = _changes(response, now, weighted, directions)[:, : space.followed]
                 ends = np.sqrt(np.cumsum(each[:, ::-1] ** 2, axis=1)).max(axis=0)[::-1]
-                space.followed = int(np.count_nonzero(np.hypot(ends, left) > LEFT * tolerance))
+                weak = np.hypot(ends, left) <= LEFT * tolerance
+                space.followed = max(1, int(np.count_nonzero(~weak)))
                 left = float(np.hypot(left, ends[space.followed :].max(initial=0.0)))
             first = error if first == np.inf else first
             report(max(0.0, np.log(error / first) / np.log(tolerance / first)))

@@ -9,6 +9,7 @@ import json
 import os
 import shlex
 import sys
+import warnings
 from datetime import datetime
 from html import escape
 from pathlib import Path
@@ -47,12 +48,17 @@ def _name(options: argparse.Namespace) -> str | None:
     given = record.command_entry(options)["options"]
     if os.environ.get(VARIABLE) or ("source" in given and os.path.isdir(given["source"])):
         return None
-    words = (value for value in given.values() if isinstance(value, str))
-    files = [Path(word) for word in words if os.path.isfile(word)]
+    files = {
+        key: Path(value)
+        for key, value in given.items()
+        if isinstance(value, str) and os.path.isfile(value)
+    }
     try:
-        scenes = [read(path) for path in files if path.suffix == ".toml"]
-        files += [Path(scene.body.file) for scene in scenes if scene.body.file]
-        contents = [path.read_bytes() for path in files]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the command itself warns
+            scenes = [read(path) for key, path in files.items() if key in ("scene", "source")]
+        bodies = [Path(scene.body.file) for scene in scenes if scene.body.file]
+        contents = [path.read_bytes() for path in (*files.values(), *bodies)]
     except (ValueError, OSError):  # the command itself says what is wrong
         return None
     code = [(str(p), p.stat().st_size, p.stat().st_mtime_ns) for p in _sources()]

@@ -53,7 +53,7 @@ from skinwave.studies.first_screen import (
     first_screen,
     with_kernels,
 )
-from skinwave.studies.surfaces import Found, Surface, quick_surface, views_of
+from skinwave.studies.surfaces import Found, Surface, Surfaces, quick_surface, views_of
 from skinwave.system.document import (
     Choice,
     Details,
@@ -264,7 +264,10 @@ def write_run_page(
         group = with_kernels(run)
         scenes = {each.column: each.scene for each in group}
         progress(f"map of {run.column}", 0.0)
-        found, failures = moved.result() if moved else quick_surface(run, None)
+        found: Surfaces = {}
+        with or_failed(failures, f"map of {run.column}"):
+            found, failed = moved.result() if moved else quick_surface(run, None)
+            failures |= failed
         surface = found.get((run.tacton, run.column), Surface())
         first = first_screen({run.tacton: group}, lambda _: surface.maps, views_of(scenes, found))
     title = f"{run.tacton} on {label(run.body)}: {run.model}"

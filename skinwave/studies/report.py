@@ -147,9 +147,10 @@ def _spatial_parts(
     """
     parts: dict[str, Any] = {}
     workers, style = gallery.workers, gallery.style
-    # Copies, because the originals keep what they compute while a thread sends them.
-    copies = replace(own), [replace(view) for view in views]
-    beside = workers.submit(_film, *copies, style, silent) if workers else None
+    beside = None
+    if workers:  # copies, because the originals keep what they compute while a thread sends them
+        copies = replace(own), [replace(view) for view in views]
+        beside = workers.submit(_film, *copies, style, silent)
     progress("draw side by side", 0.0)
     with or_failed(failures, "picture side by side"):
         parts["side by side"] = side_by_side(views, frame, gallery)
