@@ -56,8 +56,8 @@ def assembly() -> None:
 
 def waves() -> None:
     """Print the time of one and of fifteen Tactons of 1 s on the skin slab, extrapolated."""
-    scene = replace(paper15.scenes("bench", dict(paper15.tactons())[TACTON])["skin-slab"],
-                    body=BODY)  # fmt: skip
+    tacton = dict(paper15.tactons())[TACTON]
+    scene = paper15.scenes("bench", tacton, {"slab": BODY})["slab"]
     mesh, times = build(BODY, SIZE).mesh, np.arange(STEPS + 1) / RATE
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)
     load = {
