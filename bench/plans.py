@@ -4,7 +4,7 @@
 `stated`: the error of the mesh that the plan of `fem` states, on scenes of `bench.agreement` with
 solid bodies without absorbing sides, and the true error, by elements of half the size on the
 planned body. A scene fails if its true error is more than 1.1 times the stated one. Scenes that
-take minutes are left out. 40 scenes take about an hour.
+take minutes are left out.
 
 `cost`: the error of the planned response against fine elements (0.7 of the default size, absorbing
 sides twice as far away), and its time over that of the cheapest candidate within the tolerance,
