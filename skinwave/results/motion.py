@@ -130,9 +130,10 @@ def reduced_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
 
 
 def reduced_motions(
-    scenes: Sequence[Scene], options: SolveOptions
+    scenes: Sequence[Scene], options: SolveOptions, *, is_steady: bool = False
 ) -> Iterator[tuple[Scene, BodyMotion]]:
-    """Yield scenes that differ in their pressure only, path by path, each with its motion.
+    """Yield scenes that differ in their pressure only, path by path, each with its motion. With
+    `is_steady`, the tolerance is one of the strongest part of the steady state.
 
     The body is meshed once, and reduced once for each path: a subspace for all paths would be as
     large as the sum of theirs, and its cost grows with the square of its size.
@@ -149,9 +150,11 @@ def reduced_motions(
         with clock("factorise and reduce"):
             report("factorise", 0.0)
             loads = path_loads(P, points, group[0].loads[0], tolerance / 10)
+            if not is_steady:  # the start drives all frequencies, so that weak parts count, too
+                loads = loads / np.linalg.norm(loads, axis=0)
             reduced, model = reduce_body(
                 body, build, operators, sparse.csr_array(loads.T), tolerance, surface=(P, points),
-                solver=options.solver, report=report, from_loads=True,
+                solver=options.solver, report=report, from_loads=is_steady,
                 rate=first.reading.record.rate,
             )  # fmt: skip
         basis = np.ascontiguousarray(model.basis)  # its rows are read a few at a time

@@ -163,7 +163,9 @@ def map_motions(
     """
     body = scenes[0].body
     size = max(options.h or 0.0, COARSER[body.of_kind.is_plate] * default_size(body))
-    return reduced_motions(scenes, replace(options, tolerance=MAP_TOLERANCE, h=size))
+    return reduced_motions(
+        scenes, replace(options, tolerance=MAP_TOLERANCE, h=size), is_steady=True
+    )
 
 
 def _plate_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions) -> SurfaceField:

@@ -350,7 +350,7 @@ def test_records_have_a_short_repr(scene, field):
     for record in (scene, response, response.spectrum(), response.lines, skinwave.plan(scene),
                    agreement, field, field.mesh, table):  # fmt: skip
         assert repr(record) == str(record)
-        assert len(repr(record)) < 280
+        assert len(repr(record)) < 260
         assert "array" not in repr(record)
 
 
