@@ -40,6 +40,8 @@ def run_or_recall(options: argparse.Namespace) -> int:
 
 def _name(options: argparse.Namespace) -> str | None:
     """Return the cache key of a command's result, or None if it is not kept."""
+    from importlib.metadata import version
+
     from meshes import cache
     from skinwave.results import record
     from skinwave.scene.file import read
@@ -62,7 +64,8 @@ def _name(options: argparse.Namespace) -> str | None:
     except (ValueError, OSError):  # the command itself says what is wrong
         return None
     code = [(str(p), p.stat().st_size, p.stat().st_mtime_ns) for p in _sources()]
-    return cache.key("result", options.command_name, given, contents, code, versions(),
+    drawing = [version(package) for package in ("matplotlib", "pyvista")]
+    return cache.key("result", options.command_name, given, contents, code, versions(), drawing,
                      usable_cores())  # fmt: skip
 
 
