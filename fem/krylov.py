@@ -38,7 +38,7 @@ from fem.maxwell import MaxwellBranch, maxwell_only
 from fem.reduced import ReducedModel
 from fem.typing import Complex, Floats
 
-EXPANSION_POINT = 2 * np.pi * 200.0  # rad/s: best at 200 to 400 Hz for a band of 1 to 2 kHz
+EXPANSION_POINT = 2 * np.pi * 200.0  # rad/s: about 4.5 times the lowest natural frequency is best
 # Expansion point over the band with Maxwell branches, where waves of high frequency lose little and
 # many of them matter. Best between 0.8 and 1.6; the point above needs nearly twice as many moments.
 RELAXING_POINT = 1.0
@@ -74,6 +74,7 @@ def reduce(
     air: Air | None = None,
     weighted: bool = False,
     rate: int = 0,
+    point: float = EXPANSION_POINT,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> ReducedModel:
@@ -93,6 +94,8 @@ def reduce(
         follows weak ones, and frequencies with a weak response, only as far as the tolerance of
         the strongest response needs
     rate : order of the time derivative of the response that is meant, 1 for velocity
+    point : expansion point, rad/s. Ignored with `air`, and with Maxwell branches, where the band
+        sets it
     solver : backend of `factorise`
     progress : called with the fraction done as the error estimate approaches the tolerance
 
@@ -122,7 +125,7 @@ def reduce(
     start_vectors = probes[:, free].toarray().T
     if not start_vectors.any():
         raise ValueError("all probes lie where the body is fixed; move one to a free point")
-    point, operators = _expansion(operators, air, band)
+    point, operators = _expansion(operators, air, band, point)
     laws = operators.combinations()
     factors = factors_at(operators.branches, point)
     factor = factorise(laws.dynamic_stiffness(factors, operators.K, operators.M), backend=solver)
@@ -328,11 +331,12 @@ def _iterate(
     )
 
 
-def _expansion(operators: Operators, air: Air | None, band: float) -> tuple[float, Operators]:
+def _expansion(
+    operators: Operators, air: Air | None, band: float, point: float
+) -> tuple[float, Operators]:
     """Return the expansion point in rad/s, and the operators with the added mass."""
     if air is None:
-        relaxing = 2 * np.pi * RELAXING_POINT * band
-        return relaxing if operators.branches else EXPANSION_POINT, operators
+        return 2 * np.pi * RELAXING_POINT * band if operators.branches else point, operators
     return 0.0, replace(operators, M=aslinearoperator(operators.M) + air.mass)
 
 

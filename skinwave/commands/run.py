@@ -41,13 +41,12 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
     from skinwave.planning.simulate import solve
-    from skinwave.report import renderer
     from skinwave.results import record
     from skinwave.results.run import Run
     from skinwave.scene.file import read
     from skinwave.scene.scene import body_name
     from skinwave.scene.spreads import spreads_of
-    from skinwave.studies.pages import write_run_page
+    from skinwave.studies.pages import Gallery, begin_pictures, write_run_page
     from skinwave.studies.surfaces import begin_surface
     from skinwave.sweeps.sampling import check
     from skinwave.system.processes import pool
@@ -61,8 +60,7 @@ def run(options: argparse.Namespace) -> int:
         pool(1) as workers,
     ):
         moved = begin_surface(scene, solving(options, progress, model=options.model), workers)
-        if moved:
-            renderer.begin()
+        begun = begin_pictures(scene, moved, workers) if moved else {}
         plan = plan_of_command(options, scene, progress=progress)
         response = solve(scene, plan)
         warn(w for w in response.effort.warnings if w not in plan.warnings)
@@ -72,8 +70,9 @@ def run(options: argparse.Namespace) -> int:
             more = _uncertainty(options, run, plan.h, folder, progress)
         command = record.command_entry(options)
         failures = write_run_page(
-            folder, run, more, command["typed"], moved=moved, workers=workers, progress=progress
-        )
+            folder, run, more, command["typed"], moved=moved,
+            gallery=Gallery(workers=workers, begun=begun), progress=progress,
+        )  # fmt: skip
         record.write(folder, command, scene=scene, response=response)
     effort = response.effort
     summary = {

@@ -50,7 +50,7 @@ from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, sil
 from skinwave.typing import Bools, Floats
 
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
-REDUCTION_TOLERANCE = 1e-3
+REDUCTION_TOLERANCE, REDUCTION_SHARE = 4e-3, 1 / 15  # at most, and of the waveform's
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
 FORMAT = "reduced 12"  # of a cached body
 MANY_OUTPUTS = 24  # from where a body is reduced for one path, whose load has about as many parts
@@ -60,7 +60,7 @@ NEGLIGIBLE_LINE_RATIO = 1e-7  # to the strongest line at the probes
 
 def reduction_tolerance(tolerance: float) -> float:
     """Return the tolerance of a reduction, a small share of the waveform's."""
-    return min(REDUCTION_TOLERANCE, tolerance / 50)
+    return min(REDUCTION_TOLERANCE, REDUCTION_SHARE * tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -285,7 +285,8 @@ def reduce_body(
         start, others = sparse.csr_array(loads.T), outputs.toarray().T
     model = fem.reduce(
         operators, start, BAND, tolerance, loads=others, air=air(body, build, operators.free),
-        weighted=from_loads, rate=rate, solver=solver, progress=partial(report, "reduce"),
+        weighted=from_loads, rate=rate, point=meshed.expansion_point(body, build), solver=solver,
+        progress=partial(report, "reduce"),
     )  # fmt: skip
     P = P.tocsr()
     loaded = np.flatnonzero(np.diff(P.indptr))  # a few of all dofs

@@ -67,7 +67,7 @@ def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -
         return float(relative_changes(wide - usual, wide).max())
 
     try:
-        return MARGIN * change(reduction_tolerance(options.tolerance))
+        return MARGIN * change(reduction_tolerance(options.tolerance) / 3)  # both have this error
     except fem.NotReduced:  # a free body has hundreds of modes in a wide layer
         return MARGIN * change(COARSE_REDUCTION)
 

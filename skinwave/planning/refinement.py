@@ -23,6 +23,8 @@ from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import BAND, ReducedBody
 from skinwave.models.relative_change import NO_MOTION, relative_changes
 from skinwave.scene.scene import Body, Scene
+from skinwave.system.effort import Progress, silent
+from skinwave.system.processes import beside
 from skinwave.typing import Array, Floats
 
 # Ratio of the sizes of two meshes that are compared, because closer ones differ more by chance:
@@ -30,12 +32,12 @@ from skinwave.typing import Array, Floats
 APART = 1.6, 2.0
 # Ratio of their cells along an axis; and of successive sizes of a refinement, at least.
 CELLS_APART, STEP = 1.45, 1.3
+STEPS = 12  # sizes that are tried within a factor of 2
 COMPARABLE = 1.25, 1.75  # ratios of cells of meshes that are compared in any case
 LAST_STEP = 1.1  # to the finest mesh, at least
 # Of the default element size: the coarsest mesh of bodies whose elements follow their layers, and
 # of others, and the finest that is tried.
 COARSEST, COARSEST_HAND, FINEST = 4.5, 2.8, 0.4
-AT_DEFAULT = 0.017  # usual expected error of a mesh with the default size, within a factor of 3
 STILL = 1e-6  # of the waveforms: weaker motion about their mean is round-off
 
 
@@ -50,13 +52,15 @@ class SizeController:
     `order` and `margin` are such that true errors are at most 1.1 times as large in 19 of 20 random
     bodies; bench/README.md compares other estimates. With the `safety` factor on the tolerance, one
     more mesh is usually enough. `largest_factor` limits the ratio of two sizes, because coarse
-    meshes overestimate their errors.
+    meshes overestimate their errors. `at_default` is the usual error of a mesh of the default size,
+    within a factor of 3.
     """
 
     order: float = 2.5
     margin: float = 1.65
     safety: float = 0.8
     largest_factor: float = 1.6
+    at_default: float = 0.017
 
     def error(self, other: Array, values: Array, ratio: float) -> float:
         """Return the error of values (k, p), given those of a mesh `ratio` times as coarse."""
@@ -75,7 +79,9 @@ class SizeController:
 
 # Clamped edges and jumps of material slow the convergence, and so does strain. A palm has no such
 # edges, because its supports begin smoothly.
-SINGULAR, SMOOTH = SizeController(), SizeController(margin=1.1)
+SINGULAR, SMOOTH = SizeController(), SizeController(margin=1.1, at_default=0.012)
+# Meshes of files vary between runs, and one more takes longer than slightly smaller elements.
+FROM_FILE = SizeController(at_default=0.023)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,20 +106,22 @@ def refine(
     """
     h, tolerance, meshed = options.h, options.tolerance, replace(scene, body=body)
 
-    def solve(size: float) -> tuple[ReducedBody, Array]:
-        sized = replace(options, h=size)
+    def solve(size: float, progress: Progress = options.progress) -> tuple[ReducedBody, Array]:
+        sized = replace(options, h=size, progress=progress)
         prepared = reduced.prepare(meshed, sized, symmetry=symmetry, own_path=True)
         return prepared, quantity_of_interest(prepared, scene, reduced.answer(prepared, scene))
 
     check_mesh(body, h or default_size(body))
     sizes = element_sizes(body)
     size = h or first_size(meshed, sizes, tolerance)
-    coarser = sizes[: max(1, np.count_nonzero(sizes > size))]
+    coarse_sizes = sizes[: max(1, np.count_nonzero(sizes > size))]
     wanted = apart(body, size) * size
-    before = comparison_size(body, h) if h else nearest_size(coarser, wanted)
-    solved = {before: solve(before)}
-    while True:
+    before = comparison_size(body, h) if h else nearest_size(coarse_sizes, wanted)
+    with beside() as begin:
+        coarser = begin(solve, before, silent) if begin else None
         prepared, values = solve(size)
+        solved = {before: coarser.result() if coarser else solve(before)}
+    while True:
         ratios = {
             each: refinement_ratio(body, coarse.effort, prepared.effort)
             for each, (coarse, _) in solved.items()
@@ -134,10 +142,13 @@ def refine(
             return Refined(h=size, error=error, compared=before, prepared=prepared)
         solved[size] = prepared, values
         size = controller(meshed).nearest(finer_sizes(sizes, size), size, error, tolerance)
+        prepared, values = solve(size)
 
 
 def controller(scene: Scene) -> SizeController:
     """Return the controller of the element size in a scene."""
+    if scene.body.file:
+        return FROM_FILE
     is_smooth = scene.body.of_kind.is_smooth and len(scene.body.strata) == 1
     return SMOOTH if is_smooth and scene.reading.record.field != STRAIN else SINGULAR
 
@@ -148,7 +159,8 @@ def first_size(scene: Scene, sizes: Floats, tolerance: float) -> float:
     Default sizes follow the focal spot, depth and layers of a body, so that true errors of most
     random bodies were within a factor of 3 of those that they suggest.
     """
-    wanted = controller(scene).size(default_size(scene.body), AT_DEFAULT, tolerance)
+    own = controller(scene)
+    wanted = own.size(default_size(scene.body), own.at_default, tolerance)
     coarsest = sizes[0] / STEP * (1 + 1e-9)
     usable = sizes[sizes <= coarsest]
     return nearest_size(usable if len(usable) else sizes[-1:], wanted)
@@ -171,7 +183,9 @@ def element_sizes(body: Body) -> Floats:
         coarsest = min(COARSEST_HAND * default_size(body), COMPARED * coarsest_size(body))
         finest = max(finest, min(default_size(body), FINE_PALM))
     if not _has_cell_layers(body):
-        sizes = np.geomspace(coarsest, finest, 64)
+        # With twice the default size, that of maps, whose mesh may then be compared with.
+        sizes = default_size(body) * 2.0 ** (np.arange(-80, 80)[::-1] / STEPS)
+        sizes = sizes[(sizes <= coarsest) & (sizes >= finest)]
         if actual := body.of_kind.actual_size:  # one size for each mesh
             return sizes[
                 np.unique([-actual(body, h) for h in sizes.tolist()], return_index=True)[1]
@@ -218,8 +232,13 @@ def _layered_size(body: Body, layers: int, near: float) -> float:
 
 
 def refinement_ratio(body: Body, coarse: Effort, fine: Effort) -> float:
-    """Return the refinement ratio of two meshes, the mean ratio of their cells along an axis."""
-    return float((fine.cells / coarse.cells) ** (1 / (2 if body.of_kind.is_plate else 3)))
+    """Return the refinement ratio of two meshes: that of their elements under the focus for a body
+    from a file, whose other elements change little, or the mean ratio of cells along an axis.
+    """
+    cells = fine.cells / coarse.cells
+    if body.file and cells != 1:
+        return coarse.h / fine.h
+    return float(cells ** (1 / (2 if body.of_kind.is_plate else 3)))
 
 
 def about_its_rest(scene: Scene, waveforms: Array) -> Array:

@@ -45,8 +45,7 @@ REACH, STEP = 0.044, 0.001  # m: half side of a map, and spacing of its places
 NEGLIGIBLE_LINE_RATIO = 1e-4  # to the load's strongest line: weaker lines do not show on a map
 LOWEST_LEVEL = -200.0  # dB, finite so that levels can be interpolated
 RADIAL_STEP = 0.5e-3  # m between the radii from which an axisymmetric map is interpolated
-# Element size over the default one, of solids and of sheets: a map needs less accuracy than probes.
-COARSER = (1.5, 2.0)
+COARSER = 2.0  # element size over the default one: a map needs less accuracy than probes
 MAP_TOLERANCE = 0.1  # relative error of the reduced-order model of a map
 # Element size of the second map over that of the first, and order of convergence, for Richardson
 # extrapolation.
@@ -162,7 +161,7 @@ def map_motions(
     Elements are larger than those of `simulate`, or have the size in the options if that is larger.
     """
     body = scenes[0].body
-    size = max(options.h or 0.0, COARSER[body.of_kind.is_plate] * default_size(body))
+    size = max(options.h or 0.0, COARSER * default_size(body))
     return reduced_motions(
         scenes, replace(options, tolerance=MAP_TOLERANCE, h=size), is_steady=True
     )

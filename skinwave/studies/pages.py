@@ -6,9 +6,9 @@ contents and one picture. A reader chooses one Tacton's waveforms at a time, and
 
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import starmap
 from pathlib import Path
@@ -43,8 +43,9 @@ from skinwave.results.files import distinct_names, fill
 from skinwave.results.propagation import NEAR, OUTSIDE, Component, Propagation, Reach, added_lines
 from skinwave.results.run import Run
 from skinwave.results.views import View
+from skinwave.scene import paper15
 from skinwave.scene.file import dumps
-from skinwave.scene.scene import Scene
+from skinwave.scene.scene import Scene, body_name
 from skinwave.studies import overview, tables
 from skinwave.studies.first_screen import (
     FirstScreen,
@@ -75,6 +76,7 @@ COMPARED = (
 )
 T = TypeVar("T")
 PICTURES = "pictures"  # folder of a page's figures
+AT_REST, SIDE_BY_SIDE = "at-rest", "side-by-side"  # names of pictures
 QUALITY = 88  # of pictures inside a page
 NAMED = 3  # lines that a sentence names
 NO_MOTION = "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
@@ -103,11 +105,14 @@ SENSATION = (
 
 @dataclass(frozen=True, kw_only=True)
 class Gallery:
-    """Style of pictures, formats of figure files beside PNG, and processes that draw."""
+    """Style of pictures, formats of figure files beside PNG, processes that draw, and pictures that
+    they have begun by name, from `begin_pictures`.
+    """
 
     style: Style = REPORT
     formats: Sequence[str] = ()
     workers: Executor | None = None
+    begun: "Mapping[str, Future[Any]]" = field(default_factory=dict)
 
     def figure(self, name: str, figure: Figure, caption: str) -> Picture:
         """Return a figure with its files."""
@@ -120,7 +125,7 @@ class Gallery:
     def image(self, name: str, pixels: Any, caption: str) -> Picture:
         """Return an image (ny, nx, 3) of bytes with its file."""
         image, buffer = Pillow.fromarray(pixels), io.BytesIO()
-        image.save(buffer, format="png", optimize=True, dpi=(self.style.dpi, self.style.dpi))
+        image.save(buffer, format="png", dpi=(self.style.dpi, self.style.dpi))
         small, kind = _compress(image)
         return Picture(small, caption, name, kind, {"png": buffer.getvalue()})
 
@@ -210,10 +215,37 @@ def _begin_pictures(runs: Sequence[Run], gallery: Gallery) -> "dict[Run, Callabl
     processes draw beside other work.
     """
     meshed = [run for run in runs if named(run.model).default_size]
+    if (begun := gallery.begun.get(AT_REST)) and renderer().is_available:
+        return dict.fromkeys(meshed, begun.result)
     if gallery.workers and renderer().is_available:
         workers, style = gallery.workers, gallery.style
         return {run: workers.submit(_body_picture, run.scene, style).result for run in meshed}
     return {run: partial(_body_picture, run.scene, gallery.style) for run in meshed}
+
+
+def begin_pictures(
+    scene: Scene, moved: "Future[Found]", workers: Executor
+) -> "dict[str, Future[Any]]":
+    """Begin to draw a body at rest and, once its surface is there, the views of a scene, in a
+    process beside other work. Return their pixels by name, None without a renderer or views.
+    """
+    threads = ThreadPoolExecutor(2)
+
+    def at_rest() -> Any:
+        can_draw = renderer().is_available
+        return workers.submit(_body_picture, scene, REPORT).result() if can_draw else None
+
+    def side_by_side() -> Any:
+        scenes = paper15.beside_kernels(scene) | {body_name(scene.body): scene}
+        views = views_of(scenes, moved.result()[0])
+        if not (views and renderer().is_available):
+            return None
+        frame = moving_most(views[-1])
+        return workers.submit(render.picture, views, REPORT, frame).result()
+
+    begun = {AT_REST: threads.submit(at_rest), SIDE_BY_SIDE: threads.submit(side_by_side)}
+    threads.shutdown(wait=False)
+    return begun
 
 
 def _body_picture(scene: Scene, style: Style) -> Any:
@@ -250,13 +282,12 @@ def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
 
 def write_run_page(
     folder: Path, run: Run, more: Sequence[Part] = (), command: str = "", *,
-    moved: "Future[Found] | None" = None, workers: Executor | None = None,
-    progress: Progress = silent,
+    gallery: Gallery, moved: "Future[Found] | None" = None, progress: Progress = silent,
 ) -> dict[str, str]:  # fmt: skip
     """Write the folder of one run with its page, which may have more parts. Return the reasons of
     parts that failed.
 
-    `moved` is the surface of a body of elements, from `begin_surface`; `workers` draw.
+    `moved` is the surface of a body of elements, from `begin_surface`.
     """
     fill(folder, run)
     first, failures = None, dict[str, str]()
@@ -272,8 +303,8 @@ def write_run_page(
         first = first_screen({run.tacton: group}, lambda _: surface.maps, views_of(scenes, found))
     title = f"{run.tacton} on {label(run.body)}: {run.model}"
     page_of(
-        title, {run.tacton: [run]}, first, Gallery(workers=workers), after=more, command=command,
-        progress=progress, failures=failures,
+        title, {run.tacton: [run]}, first, gallery, after=more, command=command, progress=progress,
+        failures=failures,
     ).write(folder)  # fmt: skip
     return failures
 
@@ -299,7 +330,8 @@ def _drawn(groups: Mapping[str, Sequence[Run]], gallery: Gallery) -> Iterator[di
     files = dict(zip(groups, distinct_names(groups), strict=True))
     names = sorted(groups, key=lambda each: each != first_name(groups))
     draw = gallery.workers.map if gallery.workers else map
-    one = partial(_tacton_pictures, replace(gallery, workers=None), len(groups) == 1)
+    alone = replace(gallery, workers=None, begun={})
+    one = partial(_tacton_pictures, alone, len(groups) == 1)
     of_each = [(name, files[name], groups[name]) for name in names]
     return _or_here(draw(one, *zip(*of_each, strict=True)), partial(starmap, one, of_each))
 
@@ -366,17 +398,24 @@ def _spatial_parts(first: FirstScreen, gallery: Gallery, failures: dict[str, str
         return [f"Three-dimensional pictures are left out: {renderer().detail}."]
     own = next((v for v in first.views if v.column == first.body.column), first.views[-1])
     with or_failed(failures, "picture in three dimensions"):
-        frame = int(np.abs(own.inward).max(axis=1).argmax())
-        return [side_by_side(first.views, frame, gallery)]
+        begun = gallery.begun.get(SIDE_BY_SIDE)
+        drawn = begun.result() if begun else None
+        return [side_by_side(first.views, moving_most(own), gallery, drawn)]
     return []
 
 
-def side_by_side(views: Sequence[View], frame: int, gallery: Gallery) -> Picture:
-    """Return a picture of views in three dimensions at one frame."""
+def moving_most(view: View) -> int:
+    """Return the frame at which a body moves most."""
+    return int(np.abs(view.inward).max(axis=1).argmax())
+
+
+def side_by_side(views: Sequence[View], frame: int, gallery: Gallery, drawn: Any = None) -> Picture:
+    """Return a picture of views in three dimensions at one frame, or of its `drawn` pixels."""
     scales = (f"{label(view.column)}: {render.scale_text(view)}" for view in views)
     peaks = (f"{label(view.column)} {view.quantity.text(view.peak)}" for view in views)
     caption = f"{'; '.join(scales)}. Largest values: {', '.join(peaks)}. {MARKS} {COMPARED}"
-    return gallery.image("side-by-side", render.picture(views, gallery.style, frame), caption)
+    pixels = render.picture(views, gallery.style, frame) if drawn is None else drawn
+    return gallery.image(SIDE_BY_SIDE, pixels, caption)
 
 
 def _free_vibration(runs: Iterable[Run]) -> str:

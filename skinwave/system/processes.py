@@ -6,14 +6,15 @@ This module imports only light modules, because the command line starts with it.
 import os
 import signal
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor, ProcessPoolExecutor
+    from concurrent.futures import Executor, Future, ProcessPoolExecutor
 
+_RESERVED = [0]  # cores of the processes of this one's pools
 SAFE_PATH = {"PYTHONSAFEPATH": "1"}  # do not import a random.py of the working folder
 
 
@@ -42,7 +43,7 @@ def pool(count: int, threads: int | None = 1, *, renewed: bool = False) -> "Iter
     from multiprocessing import get_context
 
     begin = partial(begin_worker, threads)
-    with environment(SAFE_PATH):
+    with environment(SAFE_PATH), _reserved(count):
         executor = ProcessPoolExecutor(
             count, get_context("spawn"), initializer=begin,
             max_tasks_per_child=1 if renewed else None,
@@ -51,6 +52,31 @@ def pool(count: int, threads: int | None = 1, *, renewed: bool = False) -> "Iter
             yield executor
         finally:
             _end(executor)
+
+
+@contextmanager
+def beside() -> "Iterator[Callable[..., Future[Any]] | None]":
+    """Yield a function that begins a call in a thread, or None if processes of pools, or this one
+    as such a process, have all cores.
+    """
+    from concurrent.futures import ThreadPoolExecutor
+
+    from skinwave.system.effort import threads
+
+    if min(map(int, threads().values())) - _RESERVED[0] <= 1:
+        yield None
+        return
+    with ThreadPoolExecutor(1) as thread:
+        yield thread.submit
+
+
+@contextmanager
+def _reserved(count: int) -> Iterator[None]:
+    _RESERVED[0] += count
+    try:
+        yield
+    finally:
+        _RESERVED[0] -= count
 
 
 def _end(executor: "ProcessPoolExecutor") -> None:
