@@ -118,7 +118,8 @@ def refine(
     wanted = apart(body, size) * size
     before = comparison_size(body, h) if h else nearest_size(coarse_sizes, wanted)
     with beside() as begin:
-        coarser = begin(solve, before, silent) if begin else None
+        # Of a file both may be the same mesh, which is then read from the cache.
+        coarser = begin(solve, before, silent) if begin and not body.file else None
         prepared, values = solve(size)
         solved = {before: coarser.result() if coarser else solve(before)}
     while True:
@@ -136,7 +137,8 @@ def refine(
         }
         before, error = max(found.items(), key=lambda each: each[1])
         if ratios[before] == 1:  # the cost of the first
-            seconds = solved[before][0].effort.seconds
+            costs = solved[before][0].effort.seconds, prepared.effort.seconds
+            seconds = max(costs, key=lambda each: sum(each.values()))
             prepared = replace(prepared, effort=replace(prepared.effort, seconds=seconds))
         if h or not tolerance < error < np.inf or sizes[-1] > size / LAST_STEP:
             return Refined(h=size, error=error, compared=before, prepared=prepared)

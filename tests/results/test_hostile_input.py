@@ -40,8 +40,9 @@ def used_since(begun=None):
         Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
         return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, kilobytes("VmRSS")
     before, had = begun
-    children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    return 1024 * max(kilobytes("VmHWM") - had, children if children > before else 0)
+    children, peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, kilobytes("VmHWM")
+    # A child has the size of this process until it runs its own program.
+    return 1024 * max(peak - had, children if children > max(before, peak) else 0)
 
 
 def contents(folder):
