@@ -15,7 +15,7 @@ from scipy import fft
 from simple_model import Effort, Response
 from simple_model.quantities import STRAIN
 from skinwave.bodies.build import COMPARED
-from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
+from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size, map_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.bodies.tissue import FINE_PALM
 from skinwave.models import reduced
@@ -81,7 +81,7 @@ class SizeController:
 # edges, because its supports begin smoothly.
 SINGULAR, SMOOTH = SizeController(), SizeController(margin=1.1, at_default=0.012)
 # Meshes of files vary between runs, and one more takes longer than slightly smaller elements.
-FROM_FILE = SizeController(at_default=0.023)
+FROM_FILE = SizeController(at_default=0.026)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,6 +117,9 @@ def refine(
     coarse_sizes = sizes[: max(1, np.count_nonzero(sizes > size))]
     wanted = apart(body, size) * size
     before = comparison_size(body, h) if h else nearest_size(coarse_sizes, wanted)
+    low, high = COMPARABLE
+    if body.file and not h and low < map_size(body) / size < high:
+        before = map_size(body)  # a mesh less, if there is a map
     with beside() as begin:
         # Of a file both may be the same mesh, which is then read from the cache.
         coarser = begin(solve, before, silent) if begin and not body.file else None
@@ -128,7 +131,6 @@ def refine(
             for each, (coarse, _) in solved.items()
         }
         nearest = min(ratios, key=lambda each: abs(np.log(ratios[each] / CELLS_APART)))
-        low, high = COMPARABLE
         # The largest estimate, because a mesh may agree with another by chance.
         found = {
             each: mesh_error(meshed, ratio, (solved[each][1], values))
@@ -185,7 +187,6 @@ def element_sizes(body: Body) -> Floats:
         coarsest = min(COARSEST_HAND * default_size(body), COMPARED * coarsest_size(body))
         finest = max(finest, min(default_size(body), FINE_PALM))
     if not _has_cell_layers(body):
-        # With twice the default size, that of maps, whose mesh may then be compared with.
         sizes = default_size(body) * 2.0 ** (np.arange(-80, 80)[::-1] / STEPS)
         sizes = sizes[(sizes <= coarsest) & (sizes >= finest)]
         if actual := body.of_kind.actual_size:  # one size for each mesh

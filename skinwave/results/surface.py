@@ -20,7 +20,7 @@ from simple_model.layers.flat_body import field_lines, steady_lines
 from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
-from skinwave.bodies.sizes import default_size
+from skinwave.bodies.sizes import default_size, map_size
 from skinwave.models import named
 from skinwave.models.flat_body import field_read
 from skinwave.models.limits import takes
@@ -45,7 +45,6 @@ REACH, STEP = 0.044, 0.001  # m: half side of a map, and spacing of its places
 NEGLIGIBLE_LINE_RATIO = 1e-4  # to the load's strongest line: weaker lines do not show on a map
 LOWEST_LEVEL = -200.0  # dB, finite so that levels can be interpolated
 RADIAL_STEP = 0.5e-3  # m between the radii from which an axisymmetric map is interpolated
-COARSER = 2.0  # element size over the default one: a map needs less accuracy than probes
 MAP_TOLERANCE = 0.1  # relative error of the reduced-order model of a map
 # Element size of the second map over that of the first, and order of convergence, for Richardson
 # extrapolation.
@@ -161,7 +160,7 @@ def map_motions(
     Elements are larger than those of `simulate`, or have the size in the options if that is larger.
     """
     body = scenes[0].body
-    size = max(options.h or 0.0, COARSER * default_size(body))
+    size = max(options.h or 0.0, map_size(body))
     return reduced_motions(
         scenes, replace(options, tolerance=MAP_TOLERANCE, h=size), is_steady=True
     )

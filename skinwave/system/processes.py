@@ -60,10 +60,11 @@ def beside() -> "Iterator[Callable[..., Future[Any]] | None]":
     as such a process, have all cores.
     """
     from concurrent.futures import ThreadPoolExecutor
+    from multiprocessing import parent_process
 
-    from skinwave.system.effort import threads
+    from skinwave.system.effort import usable_cores
 
-    if min(map(int, threads().values())) - _RESERVED[0] <= 1:
+    if parent_process() or usable_cores() - _RESERVED[0] <= 1:
         yield None
         return
     with ThreadPoolExecutor(1) as thread:
