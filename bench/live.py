@@ -93,7 +93,8 @@ def main() -> None:
             print(line(f"{body}: page ready", [1e3 * (time.perf_counter() - began)]))
             for label, (times, cpu) in keys(tab, count).items():
                 print(line(f"{body}: {label}, key to pixels", times), f"   CPU {cpu:.0f} ms")
-            with Server(data) as server:
+            with Server() as server:
+                server.show(data)
                 threading.Thread(target=server.serve_forever, daemon=True).start()
                 tab.goto(server.address)
                 tab.locator(".tile").first.wait_for()

@@ -36,10 +36,11 @@ def run(options: argparse.Namespace) -> int:
 
     base = f"/{options.base_url.strip('/')}/" if options.base_url.strip("/") else "/"
     scenes = [read_scene(path) for path in options.scenes]
-    with progress_of(options) as progress:
-        data = data_of(scenes, progress, bodies=QUICK, test=False)
-    warn(with_failures(data["failures"], []))
-    with Server(data, options.port, base) as server, tempfile.TemporaryDirectory() as private:
+    with Server(options.port, base) as server, tempfile.TemporaryDirectory() as private:
+        with progress_of(options) as progress:
+            data = data_of(scenes, progress, bodies=QUICK, test=False)
+        warn(with_failures(data["failures"], []))
+        server.show(data)
         say(f"skinwave: {server.address} (press Ctrl-C to stop)", sys.stderr)
         has_display = sys.platform in ("win32", "darwin") or any(map(os.environ.get, DISPLAYS))
         if base != "/":

@@ -49,16 +49,15 @@ class Superseded(Exception):
 
 
 class Server(ThreadingHTTPServer):
-    """Server of a page on a port, 0 for any. `base` is the path under which a proxy shows the page;
-    it begins and ends with "/". Raises ValueError if the path or the port cannot be used.
+    """Server of a page on a port, 0 for any, which `show` sets. `base` is the path under which a
+    proxy shows the page; it begins and ends with "/". Raises ValueError if the path or the port
+    cannot be used.
     """
 
     daemon_threads = True
     block_on_close = False
 
-    def __init__(
-        self, data: Mapping[str, Any], port: int = 0, base: str = "/", token: str = ""
-    ) -> None:
+    def __init__(self, port: int = 0, base: str = "/", token: str = "") -> None:
         if not BASE.fullmatch(base):
             raise ValueError(
                 f"base-url = {base} is not a path. Give a path such as /user/name/proxy/8123/."
@@ -71,9 +70,13 @@ class Server(ThreadingHTTPServer):
                 f"Port {port} cannot be used: {getattr(error, 'strerror', None) or error}. Give "
                 "another with --port, or 0 for any free one."
             ) from None
-        api = {"base": base, "token": self.token}
-        self.page = page({**data, "api": api}).encode()
+        self.page = b""
         self._newest, self._numbers, self._computing = 0, count(1), Lock()
+
+    def show(self, data: Mapping[str, Any]) -> None:
+        """Set the page from data of `data_of`."""
+        api = {"base": self.base, "token": self.token}
+        self.page = page({**data, "api": api}).encode()
 
     @property
     def address(self) -> str:

@@ -19,7 +19,14 @@ from simple_model.load.focus import spot_width
 from simple_model.plates.free_modes import free_vibration, relaxing_stiffness
 from simple_model.plates.modes import PlateModes
 from skinwave.models.laws import relaxing
-from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus, thin_plate_part
+from skinwave.models.limits import takes
+from skinwave.models.plate_modes import (
+    STRETCHED,
+    modes_of,
+    plate_of,
+    relative_modulus,
+    thin_plate_part,
+)
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.arrays import pack, quantise
 from skinwave.system.effort import Progress, silent
@@ -29,6 +36,7 @@ STEP, SIDE = 3e-3, 37  # m between places of the grid of fields, and number of p
 LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last value
 LOWEST = 0.1  # m: lowest height of the focus
 ERROR = 0.01  # relative, of lines above -40 dB; it is larger for several foci on a wide path
+SLOPES = 81  # places along a side, for gradients of modes
 TYPICAL, TOLERANCE = 140.0, 0.05  # Hz and relative error, for a warning about thick sheets
 BAND = 1300.0  # Hz: modes below are kept, modes above are combined
 COUPLED_BAND = 2600.0  # Hz: coupling by loss is included for modes below
@@ -63,9 +71,7 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     stiffness, times = relaxing_stiffness(squared - bent, bent, solid)
     stiffness[:, 1] += damping
     free = free_vibration(stiffness, times)
-    tacton = Tacton(am_frequency=TYPICAL, duration=0.1)
-    scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=(tuple(middle),))
-    thin = thin_plate_part(scene)
+    thin = thin_plate_part(_typical(body))
     return {
         "kind": "modal", "error": hypot(ERROR, thin.error), "lowest_height_mm": 1e3 * LOWEST,
         "warnings": [thin.warning(TOLERANCE)] if thin.error > TOLERANCE else [],
@@ -75,9 +81,35 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
         "law": pack(relative.astype(np.complex128)), "law_step": LAW_STEP,
         "V": quantise((turn.T @ fields)[:, inside]),
         "inside": "".join("01"[int(each)] for each in inside),
+        "stretching": stretching_of(body, modes, turn),
         "kinds": free.poles.shape[1],
         "poles": pack(free.poles), "residues": pack(free.residues),
     }  # fmt: skip
+
+
+def stretching_of(body: Body, modes: PlateModes, turn: Floats) -> dict[str, Any] | None:
+    """Return the `slopes` (r,) of combinations (m, r) of modes, the integrals of their squared
+    gradients in 1/kg, and the `tension` in N/m per integral of the squared gradient of the
+    deflection, for a sheet whose edges do not move inwards; None for others.
+
+    By Berger's approximation, stretching is the same everywhere (J Appl Mech 22:465, 1955).
+    """
+    if not takes(STRETCHED, _typical(body)):
+        return None
+    x, y = (np.linspace(-side / 2, side / 2, SLOPES) for side in (body.width, body.height))
+    fields = (modes.on_grid(x, y) @ turn).reshape(SLOPES, SLOPES, -1)
+    across, along = (np.asarray(np.gradient(fields, own, axis=k)) for k, own in enumerate((x, y)))
+    slopes = (across**2 + along**2).mean(axis=(0, 1))
+    area, plate = body.width * body.height, modes.plate
+    membrane = 12 * np.sqrt(plate.d11 * plate.d22) / body.depth**2
+    return {"slopes": pack(area * np.asarray(slopes)), "tension": membrane / (2 * area)}
+
+
+def _typical(body: Body) -> Scene:
+    """Return a Tacton at the middle of a sheet."""
+    pressure = MovingPressure(tacton=Tacton(am_frequency=TYPICAL, duration=0.1))
+    x, y = body.placement.offset
+    return Scene(pressure=pressure, body=body, probes=((float(x), float(y)),))
 
 
 def combine_modes(modes: PlateModes, fields: Floats) -> tuple[Floats, Floats, Floats]:

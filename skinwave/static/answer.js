@@ -1,14 +1,13 @@
 // An answer of the page: the response of the kernel and of a body to the load of the controls.
 
-import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapOf, namesOf, reach,
+import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapOf, namesOf, peakAt, reach,
   shareOutside } from "./evaluate.js";
 import { respond as respondOfKernel } from "./kernel.js";
 import { pathSamples, spotWidth } from "./load.js";
-import { largestOf } from "./numeric.js";
 import { loadOf } from "./values.js";
 
 const LARGE_DEFLECTION = 0.5; // of a sheet's thickness, above which a linear model is not valid
-const EXAMINED = 0.06, STEP = 2e-4; // s of motion in which the largest is looked for, and the time step
+const TOLERANCE = 0.05; // of the error of a sheet's lines by its stretching
 
 /**
  * Numbers that each move of a control needs at once; those that need maps are in `mapsOf`. Throws an Error
@@ -33,29 +32,41 @@ export const typeset = (name) => name.replace(/-/g, " − ").replace(/\+/g, " + 
   .replace(/(\d)(?=f)/g, "$1 ").replace(/^ − /, "−");
 
 /** Keys of the result of `mapsOf`. */
-export const NUMBERS_OF_MAPS = ["maps", "share", "kernelShare", "reach", "kernelReach", "delay", "invalid",
-  "warnings"];
+export const NUMBERS_OF_MAPS = ["maps", "peaks", "share", "kernelShare", "reach", "kernelReach", "delay",
+  "invalid", "stretching", "warnings"];
 
-/** Maps of the kernel and the waves, and the numbers that need them. */
+/**
+ * Maps of the kernel and the waves, and the numbers that need them. `peaks` are the largest values of both at
+ * the place where each is strongest, in Pa and in SI units of the quantity.
+ */
 export function mapsOf(answer) {
   const { kernel, waves, load, body } = answer;
-  const maps = { kernel: mapOf(kernel), waves: mapOf(waves) };
+  const maps = { kernel: mapOf(kernel), waves: mapOf(waves) }, { rate } = QUANTITIES[answer.values.quantity];
   return {
-    maps, share: shareOutside(maps.kernel.rms, maps.waves.rms),
+    maps, peaks: { kernel: peakAt(kernel, maps.kernel.strongest), waves: peakAt(waves, maps.waves.strongest, rate) },
+    share: shareOutside(maps.kernel.rms, maps.waves.rms),
     kernelShare: shareOutside(maps.kernel.rms, maps.kernel.rms),
     reach: body.is_skin ? reach(load, maps.waves) : null, kernelReach: reach(load, maps.kernel),
     delay: delayOf(kernel, waves, load)?.delay ?? NaN,
-    invalid: invalidity(answer), warnings: warnings(answer),
+    ...validity(answer), warnings: warnings(answer),
   };
 }
 
-/** Reason why a result is outside the validity of its model; "" if it is valid. */
-function invalidity({ body, waves, x, y }) {
-  if (!body.thickness_mm) return "";
-  const times = Float64Array.from({ length: EXAMINED / STEP }, (_, k) => k * STEP);
-  const largest = Math.max(...[[0, 0], [x, y]].map((at) => largestOf(waves.waveform(...at, times))));
-  const ratio = 1e3 * largest / body.thickness_mm;
-  return ratio > LARGE_DEFLECTION ? `linear model, ${ratio.toPrecision(2)} × thickness` : "";
+/**
+ * Error of a sheet's lines by its stretching, which this page leaves out, and the reason why a result is
+ * `invalid`, "" if it is valid: {stretching, invalid}.
+ */
+function validity({ body, waves, x, y }) {
+  if (!body.thickness_mm) return { stretching: 0, invalid: "" };
+  if (!body.stretching) {
+    const most = Math.max(...[[0, 0], [x, y]].map((at) => peakAt(waves, at)));
+    const ratio = 1e3 * most / body.thickness_mm;
+    return { stretching: 0,
+      invalid: ratio > LARGE_DEFLECTION ? `linear model, ${ratio.toPrecision(2)} × thickness` : "" };
+  }
+  const stretching = body.stretchingOf(waves);
+  return { stretching, invalid: stretching > TOLERANCE
+    ? `stretching is left out: error ${stretching < 0.5 ? (100 * stretching).toPrecision(2) : "above 50"} %` : "" };
 }
 
 function warnings({ load, body }) {

@@ -115,7 +115,8 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       const isStill = values.shape === "point" || Boolean(values.paths);
       toggle("size", isStill || values.shape === "polyline");
       toggle("speed", isStill);
-      toggle("phases", values.foci < 2);
+      toggle("phases", values.foci < 2 || Boolean(values.paths));
+      toggle("shape", Boolean(values.paths));
       toggle("sweep", !["line", "polyline"].includes(values.shape));
       toggle("polyline", values.shape !== "polyline");
       toggle("ramp", !values.pulses);

@@ -1,6 +1,7 @@
 // Evaluation of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
 
 import { fourier, largestOf } from "./numeric.js";
+import { strongLines, synthesise } from "./surface3d.js";
 import { drawingFrequency, jumps, levelFactor, loadLines, pathSamples, positionOf, rhythmLevel,
   rhythmPeriod } from "./load.js";
 
@@ -9,6 +10,7 @@ const PACINIAN = -13, NON_PACINIAN = 12; // dB re 1 um peak: at 250 Hz for a foc
 const LOWEST = 10, HIGHEST = 1000; // Hz: range of the thresholds
 const PRESSURE = 2.2, PRESSURE_AT = 200; // threshold of a component in Pa, and its frequency in Hz
 const SIDE = 45, HALF = 0.044; // places along a side of a map, and half its width in metre
+const EXAMINED = 0.06, STEP = 2e-4; // s of motion in which the largest is looked for, and the time step
 const LEVELS = 4096; // instants of a rhythm that are averaged
 const OUTSIDE = 0.1; // of the largest RMS: edge of the kernel's region
 const PATH_PLACES = 12; // on which the delay is looked for
@@ -75,7 +77,9 @@ export const MAP_LINE = Float64Array.from({ length: SIDE }, (_, k) => HALF * (2 
 
 /**
  * Map of a motion {rms, level} while a pulse is on, by row y and column x; NaN off the body. `rms` is about
- * the mean; `level` in dB is that of the highest line.
+ * the mean; `level` in dB is that of the highest line. `largest` (l,) are the amplitudes of lines where they
+ * are largest, `strongest` is the place [x, y] in metre of the largest `rms`, and `at(t, out)` writes the
+ * steady motion about the mean at a time in s.
  */
 export function mapOf(motion) {
   const { re, im } = motion.onGrid(MAP_LINE, MAP_LINE), places = SIDE * SIDE;
@@ -92,7 +96,18 @@ export function mapOf(motion) {
     level[p] = Number.isNaN(rms[p]) ? NaN : 10 * Math.log10(Math.max(level[p], 1e-20));
     rms[p] = Math.sqrt(rms[p]);
   }
-  return { rms, level };
+  const strong = strongLines({ f: motion.f, re, im }), top = Math.max(0, rms.indexOf(largestOf(rms)));
+  return { rms, level, largest: strong.largest, crest: strong.crest,
+    strongest: [MAP_LINE[top % SIDE], MAP_LINE[Math.floor(top / SIDE)]],
+    at: (t, out) => synthesise(strong, { re, im }, t, out) };
+}
+
+/** Largest value of the `rate`-th derivative of a motion at a place within the first `EXAMINED` s. */
+export function peakAt(motion, [x, y], rate = 0) {
+  const times = Float64Array.from({ length: EXAMINED / STEP }, (_, k) => k * STEP);
+  let values = motion.waveform(x, y, times);
+  for (let n = 0; n < rate; n++) values = values.map((v, k) => (k ? (v - values[k - 1]) / STEP : 0));
+  return largestOf(values);
 }
 
 /** Share 0 to 1 of squared motion where the kernel is 20 dB below its largest; NaN if nothing moves. */

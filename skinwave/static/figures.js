@@ -16,6 +16,7 @@ const LEVEL_RANGE = 60; // dB that the plot of levels over a control shows
 const STEM_SPACING = 3.5; // px between stems of the same line
 const MOST_NAMES = 7, LEAST_NAMED = 0.02; // lines with a name; share of the tallest line that they need
 const LARGE_RATIO = 10; // of A and B, above which A is drawn with a factor
+const LOWEST_LOG = 10; // Hz where a logarithmic axis begins
 const FLOOR = -40; // dB re the largest: smaller values count as this in a difference of maps
 const PRESSURE = { per: 1, rate: 0 };
 
@@ -76,7 +77,10 @@ function nameOfA(factor) {
   return `A × ${factor > 1 ? factor : factor.toFixed(-Math.log10(factor))}`;
 }
 
-/** Plot of the waveforms. `scale(name, largest)` gives the top of an axis. */
+/**
+ * Plot of the waveforms. `scale(name, largest)` gives the top of an axis, which has room for the largest
+ * value at the place where kernel or waves are strongest, so that what is silent is drawn so.
+ */
 export function waveformPlot(answer, span, { pinned, measured, scale }) {
   const { kernel, waves, values, x, y } = answer, quantity = QUANTITIES[values.quantity];
   const curves = [{ role: "kernel", axis: "y", name: "kernel", ...waveform(kernel, [x, y], span, PRESSURE) }];
@@ -96,7 +100,8 @@ export function waveformPlot(answer, span, { pinned, measured, scale }) {
   let below = 0.04; // share of the top; the same on both axes, so that their zeros are level
   for (const [name, axis] of Object.entries(axes)) {
     const drawn = curves.filter((curve) => curve.axis === name).flatMap((curve) => curve.y);
-    axis.top = scale(`waveform ${name} ${values.quantity}`, largestOf(drawn));
+    const peak = name === "y" ? answer.peaks?.kernel : quantity.per * (answer.peaks?.waves ?? 0);
+    axis.top = scale(`waveform ${name} ${values.quantity}`, Math.max(largestOf(drawn), peak || 0));
     below = Math.max(below, -drawn.reduce((least, v) => Math.min(least, v), 0) / axis.top);
   }
   const low = scale("waveform below", below);
@@ -130,7 +135,7 @@ function measuredSpectrum(measured, answer, per, highest) {
  * Plot of the spectra as stems side by side, averaged over the rhythm. The threshold of skin is drawn for
  * lines that exceed it while a pulse is on.
  */
-export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
+export function spectrumPlot(answer, { pinned, measured, highest, log, scale }) {
   const { kernel, waves, body, values: { quantity: name } } = answer, { unit, per, rate } = QUANTITIES[name];
   const mean = meanLevel(answer.load);
   const stems = (role, axis, title, f, amplitudes, offset, factor = mean) => {
@@ -148,8 +153,12 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
     curves.push(stems("pinned", "y2", nameOfA(factor), pinned.waves.f, amplitudes, 0, factor * moves));
   }
   const axes = { y: { label: "Pa", role: "kernel" }, y2: { label: unit, role: "waves" } };
+  const ofMap = ({ f }, name, { per: scaled, rate: order }) => (answer.maps?.[name].largest ?? []).reduce(
+    (most, v, l) => Math.max(most, scaled * (2 * Math.PI * f[l]) ** order * v || 0), 0);
   for (const [axis, each] of Object.entries(axes)) {
-    const tallest = Math.max(...curves.filter((curve) => curve.axis === axis).map(({ y }) => largestOf(y)));
+    const drawn = curves.filter((curve) => curve.axis === axis).map(({ y }) => largestOf(y));
+    const tallest = Math.max(...drawn, mean * (axis === "y" ? ofMap(kernel, "kernel", PRESSURE)
+      : ofMap(waves, "waves", { per, rate })));
     each.range = [0, scale(`spectrum ${axis} ${name}`, 1.2 * tallest)];
   }
   if (measured?.quantity === name) {
@@ -167,7 +176,7 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
     .slice(0, MOST_NAMES);
   return {
     label: "Spectrum at the point: lines of the kernel in Pa and of the waves, side by side",
-    x: { label: "frequency, Hz", range: [0, highest] }, ...axes, curves, names: named,
+    x: { label: "frequency, Hz", range: [log ? LOWEST_LOG : 0, highest], log }, ...axes, curves, names: named,
     hatched: answer.invalid,
   };
 }
@@ -176,7 +185,8 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
 export function dispersionPlot(answer, highest) {
   const { body: { dispersion }, load: { path }, waves } = answer;
   if (!dispersion) {
-    const text = "Dispersion curves are not available for this body.";
+    const text = body.isRequested && !body.hasFailed ? "The dispersion curves are being computed."
+      : "Dispersion curves are not available for this body.";
     return { label: text, x: { label: "frequency, Hz", range: [0, highest] },
       y: { label: "m/s", range: [0, 10] }, curves: [], names: [{ x: highest / 2, y: 5, axis: "y", text }] };
   }

@@ -3,9 +3,9 @@
 import { joinedCorners } from "./load.js";
 import { QUANTITIES, lineTable } from "./evaluate.js";
 import { largestOf } from "./numeric.js";
-import { loadOf, pulsesOf } from "./values.js";
+import { STARTS, check, loadOf, pulsesOf } from "./values.js";
 
-const NAME = "skinwave live";
+const NAME = "skinwave live", SESSION = "skinwave live session";
 const RATE = 10000; // Hz of waveforms
 const FULL_SCALE = 32767;
 
@@ -72,8 +72,8 @@ export function linesCsv(answer) {
   ]));
 }
 
-/** WAV (16 bit, mono) of samples without their mean, scaled to the full range. */
-function wav(samples, rate) {
+/** WAV (16 bit, mono) of samples from -1 to 1. */
+function wav({ samples, rate }) {
   const bytes = new DataView(new ArrayBuffer(44 + 2 * samples.length));
   const text = (at, word) => [...word].forEach((letter, k) => bytes.setUint8(at + k, letter.charCodeAt(0)));
   text(0, "RIFF"); text(8, "WAVEfmt "); text(36, "data");
@@ -81,20 +81,41 @@ function wav(samples, rate) {
   const words = [16, 1 + (1 << 16), rate, 2 * rate, 2 + (16 << 16)];
   words.forEach((word, k) => bytes.setUint32(16 + 4 * k, word, true));
   bytes.setUint32(40, 2 * samples.length, true);
-  const mean = samples.reduce((sum, value) => sum + value, 0) / samples.length;
-  const centred = samples.map((value) => value - mean), scale = FULL_SCALE / (largestOf(centred) || 1);
-  centred.forEach((value, k) => bytes.setInt16(44 + 2 * k, Math.round(scale * value), true));
+  samples.forEach((value, k) => bytes.setInt16(44 + 2 * k, Math.round(FULL_SCALE * value), true));
   return new Uint8Array(bytes.buffer);
 }
 
+/** Displacement at the point as sound: samples from -1 to 1 without their mean, and their rate in Hz. */
+export function samplesOf({ load, waves, x, y }) {
+  const values = waves.waveform(x, y, timesOf(load));
+  const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
+  const centred = values.map((value) => value - mean), largest = largestOf(centred) || 1;
+  return { samples: centred.map((value) => value / largest), rate: RATE };
+}
+
 /** WAV of the displacement at the point. */
-export const waveformWav = ({ load, waves, x, y }) => wav(waves.waveform(x, y, timesOf(load)), RATE);
+export const waveformWav = (answer) => wav(samplesOf(answer));
+
+/** Session (JSON) of the values of the controls, and of those of A, if it is pinned. */
+export const sessionJson = ({ values, pinned }) => `${JSON.stringify({ format: SESSION, b: values,
+  ...(pinned && { a: pinned.values }) }, null, 2)}\n`;
+
+/** Values {b, a} of a session; throws an Error with a sentence for users if it is not one of this page. */
+export function readSession(text, name) {
+  let found = {};
+  try { found = JSON.parse(text); } catch { /* not JSON */ }
+  if (found?.format !== SESSION) throw new Error(`${name} is no session of this page. Choose a file from Save.`);
+  const checked = (own) => ({ ...STARTS, ...Object.fromEntries(
+    Object.entries(own).map(([key, value]) => [key, check(key, value)])) });
+  return { b: checked(found.b ?? {}), a: found.a ? checked(found.a) : null };
+}
 
 /** Files that the page saves: [[title, name, type, (answer) => text or bytes]]. */
 export const WRITERS = [
   ["Waveforms, CSV", "waveforms.csv", "text/csv", waveformCsv],
   ["Lines, CSV", "lines.csv", "text/csv", linesCsv],
   ["Displacement, WAV", "displacement.wav", "audio/wav", waveformWav],
+  ["Session, A and B, JSON", "session.json", "application/json", sessionJson],
   ["Scene, TOML", "scene.toml", "application/toml", ({ values, body }) => sceneToml(values, body)],
 ];
 

@@ -39,19 +39,22 @@ export function respond(load) {
     });
     return { re, im };
   };
-  const waveform = (x, y, times) => Float64Array.from(times, pressureAt(load, x, y));
-  return { f, unit: "Pa", load, at, onGrid, waveform };
+  const pressure = pressureOf(load);
+  const waveform = (x, y, times) => Float64Array.from(times, (t) => pressure(t)(x, y));
+  const snapshot = (t, xs, ys, out) => {
+    const now = pressure(t);
+    for (let p = 0; p < out.length; p++) out[p] = now(xs[p % xs.length], ys[Math.floor(p / xs.length)]);
+  };
+  return { f, unit: "Pa", load, at, onGrid, waveform, snapshot };
 }
 
-/** Pressure in Pa at a place as a function of the time in s, with the rhythm and the mean. */
-function pressureAt(load, x, y) {
+/** Function of the time in s that gives the pressure in Pa over x, y in metre, with rhythm and mean. */
+function pressureOf(load) {
   const fd = drawingFrequency(load.path), position = positionOf(load.path);
   return (t) => {
-    let sum = 0;
-    for (const ahead of load.foci) {
-      const [px, py] = position((((fd * t + ahead) % 1) + 1) % 1);
-      sum += spot((x - px) ** 2 + (y - py) ** 2, load.height, load.profile);
-    }
-    return sum * gainAt(load, t) * levelFactor(load, rhythmLevel(load, t));
+    const foci = load.foci.map((ahead) => position((((fd * t + ahead) % 1) + 1) % 1));
+    const gain = gainAt(load, t) * levelFactor(load, rhythmLevel(load, t));
+    return (x, y) => gain * foci.reduce((sum, [px, py]) => (
+      sum + spot((x - px) ** 2 + (y - py) ** 2, load.height, load.profile)), 0);
   };
 }

@@ -25,18 +25,20 @@ function picture(width, height) {
   return canvas;
 }
 
-/** Image of the values, one pixel for each place; transparent off the body. */
-function image(options, n) {
+/** Paint the values on a canvas, one pixel for each place; transparent off the body. */
+function paint(canvas, options) {
   const { rms, signed } = options, onScale = placeOnScale(options), colours = signed ? SIGNED : SEQUENTIAL;
-  const made = picture(n, n), context = made.getContext("2d"), data = context.createImageData(n, n);
+  const n = canvas.width, context = canvas.getContext("2d"), data = context.createImageData(n, n);
   rms.forEach((value, p) => {
     if (Number.isNaN(value)) return;
     const from = 4 * Math.round((TABLE_LENGTH - 1) * Math.min(Math.max(onScale(value), 0), 1));
     data.data.set(colours.subarray(from, from + 4), 4 * ((n - 1 - Math.floor(p / n)) * n + p % n));
   });
   context.putImageData(data, 0, 0);
-  return made.toDataURL();
+  return canvas;
 }
+
+const sideOf = ({ rms }) => Math.round(Math.sqrt(rms.length)); // places along a side of a map
 
 /** Image of the colours of a scale, left to right. */
 function bar(table) {
@@ -92,16 +94,16 @@ export function contours(values, n) {
   return segments;
 }
 
-/** Markup of the square of a map: image, contours, paths, foci and point. */
+/** Markup of the square of a map: image, unless a canvas below shows it, contours, paths, foci and point. */
 function inside(options, { box, image: url }) {
-  const { path = [], foci = [], point, hatched } = options, at = toPixels(box), parts = [];
-  const n = Math.round(Math.sqrt(options.rms.length)), cell = box.side / (n - 1);
+  const { path = [], point, hatched } = options, at = toPixels(box), parts = [];
+  const n = sideOf(options), cell = box.side / (n - 1);
   const drawZeros = (values, ...looks) => {
     const lines = contours(values, n).map((ends) => ends.map(([i, j]) => (
       [box.x + i * cell, box.y + box.side - j * cell])));
     parts.push(...looks.map((look) => line(lines.flat(), { ...look, apart: 2 })));
   };
-  parts.push(imageMarkup(url, box.x - cell / 2, box.y - cell / 2, box.side + cell, box.side + cell));
+  if (url) parts.push(imageMarkup(url, box.x - cell / 2, box.y - cell / 2, box.side + cell, box.side + cell));
   if (hatched) {
     for (let k = -box.side, odd = false; k < box.side; k += 9, odd = !odd) {
       const ends = [[box.x + k, box.y + box.side], [box.x + k + box.side, box.y]];
@@ -118,12 +120,7 @@ function inside(options, { box, image: url }) {
   for (const each of path) {
     if (each.length > 1) parts.push(line(each.map(at), { colour: COLOURS.path, width: 1.8 }));
   }
-  for (const [x, y] of foci.map(at)) {
-    for (const [colour, width] of [["#fff", 3.4], ["#1673b1", 2]]) {
-      parts.push(`<circle cx="${x}" cy="${y}" r="5" fill="none" stroke="${colour}"
-        stroke-width="${width}"/>`);
-    }
-  }
+  parts.push(`<g class="foci">${fociMarkup(options, box)}</g>`);
   if (point) {
     const [x, y] = at(point);
     for (const [colour, width] of [["#fff", 4], [COLOURS.point, 2.2]]) {
@@ -133,6 +130,10 @@ function inside(options, { box, image: url }) {
   }
   return parts.join("");
 }
+
+const fociMarkup = ({ foci = [] }, box) => foci.map(toPixels(box)).flatMap(([x, y]) => (
+  [["#fff", 3.4], ["#1673b1", 2]].map(([colour, width]) => `<circle cx="${x}" cy="${y}" r="5" fill="none"
+    stroke="${colour}" stroke-width="${width}"/>`))).join("");
 
 /** Markup of a map; `clip` is the name of its clipping path. */
 function markup(options, state, clip) {
@@ -172,7 +173,7 @@ function barMarkup({ largest, unit, decibel, signed }, { box, bar: url }) {
 
 /** Value of a map at the place nearest to [x, y] in metre; NaN off the body. */
 function valueAt({ rms }, at) {
-  const n = Math.round(Math.sqrt(rms.length));
+  const n = sideOf({ rms });
   const [i, j] = at.map((place) => Math.round((place / REACH + 1) * (n - 1) / 2));
   return Math.min(i, j) < 0 || Math.max(i, j) >= n ? NaN : rms[j * n + i];
 }
@@ -184,11 +185,58 @@ const readout = (options, place) => {
 };
 
 function imagesOf(options, before) {
-  const keys = ["rms", "largest", "decibel", "signed"];
+  const keys = ["rms", "largest", "decibel", "signed", "moving"];
   const same = before && keys.every((key) => before.options[key] === options[key]);
   if (same) return { image: before?.image, bar: before?.bar };
-  const n = Math.round(Math.sqrt(options.rms.length));
-  return { image: image(options, n), bar: bar(options.signed ? SIGNED : SEQUENTIAL) };
+  const n = sideOf(options), painted = options.moving ? null : paint(picture(n, n), options);
+  return { image: painted?.toDataURL(), bar: bar(options.signed ? SIGNED : SEQUENTIAL) };
+}
+
+/** The canvas below a map that moves, in its place. */
+function canvasBelow(svg, options, { x, y, side }) {
+  let canvas = svg.previousElementSibling;
+  if (canvas?.className !== "moving") {
+    if (!options.moving) return null;
+    canvas = document.createElement("canvas");
+    canvas.className = "moving";
+    svg.before(canvas);
+  }
+  canvas.hidden = !options.moving;
+  const n = sideOf(options), cell = side / (n - 1), own = svg.getBoundingClientRect();
+  const around = svg.parentElement.getBoundingClientRect(), within = { left: own.left - around.left + x - cell / 2,
+    top: own.top - around.top + y - cell / 2, width: side + cell, height: side + cell };
+  if (canvas.width !== n) [canvas.width, canvas.height] = [n, n];
+  for (const [name, length] of Object.entries(within)) canvas.style[name] = `${length}px`;
+  canvas.style.clipPath = `inset(${cell / 2}px)`;
+  return canvas;
+}
+
+/** Draw a map with its title, paths and foci on a canvas. */
+export function drawFrame(context, box, options) {
+  const at = toPixels(box), { path, foci, title } = options, n = sideOf(options);
+  context.drawImage(paint(picture(n, n), options), box.x, box.y, box.side, box.side);
+  const stroke = (colour, width, points, isClosed) => {
+    Object.assign(context, { strokeStyle: colour, lineWidth: width });
+    context.beginPath();
+    if (isClosed) context.arc(...points, 7, 0, 2 * Math.PI);
+    else points.forEach((point, k) => context[k ? "lineTo" : "moveTo"](...point));
+    context.stroke();
+  };
+  for (const each of path) stroke(COLOURS.path, 2, each.map(at));
+  for (const place of foci.map(at)) {
+    stroke("#fff", 4, place, true);
+    stroke("#1673b1", 2, place, true);
+  }
+  Object.assign(context, { fillStyle: "#111", font: "15px sans-serif" });
+  context.fillText(title, box.x, box.y - 10);
+}
+
+/** Show other values and foci on a map that moves. Everything else stays. */
+export function moveMap(svg, { rms, foci }) {
+  const { options, box } = states.get(svg);
+  Object.assign(options, { rms, foci });
+  paint(svg.previousElementSibling, options);
+  svg.querySelector(".foci").innerHTML = fociMarkup(options, box);
 }
 
 /**
@@ -198,7 +246,8 @@ function imagesOf(options, before) {
  *   largest: end of the scale; decibel: range of the scale in dB below `largest`, or 0 if it is linear;
  *   signed: whether the scale is red and blue about 0; level: values (n * n) with a contour at 0;
  *   influenced: the kernel's values (n * n) with a contour at -20 dB; path: paths of points [x, y] in metre;
- *   foci: places [x, y] in metre; point: [x, y] in metre; title; hatched: why the values are not valid
+ *   foci: places [x, y] in metre; point: [x, y] in metre; title; hatched: why the values are not valid;
+ *   moving: whether `moveMap` will show other values at once
  */
 export function drawMap(svg, options) {
   const before = states.get(svg), { width, height } = svg.getBoundingClientRect();
@@ -206,6 +255,8 @@ export function drawMap(svg, options) {
   states.set(svg, state);
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   svg.innerHTML = markup(options, state, `clip-${svg.id}`);
+  const canvas = canvasBelow(svg, options, state.box);
+  if (options.moving) paint(canvas, options);
   if (options.point) {
     svg.setAttribute("aria-label", `${options.title || "Map"}. Selected point ${
       readout(options, options.point)}. Arrow keys move it.`);
@@ -250,7 +301,9 @@ export function mapControls(svg, onPoint) {
     const way = ways[event.key], from = states.get(svg)?.options.point;
     if (!way || !from || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    onPoint(...bounded(from.map((v, k) => v + way[k] * (event.shiftKey ? LONG_KEY_STEP : KEY_STEP))));
+    const next = bounded(from.map((v, k) => v + way[k] * (event.shiftKey ? LONG_KEY_STEP : KEY_STEP)));
+    states.get(svg).options.point = next; // for the next key, before it is drawn
+    onPoint(...next);
   });
 }
 
@@ -260,4 +313,4 @@ export const MAP_LEGEND = [
   ["kernel at −20 dB", 'stroke="currentColor" stroke-width="1.2"'],
   ["detection threshold", `stroke="${COLOURS.threshold}" stroke-width="2"`],
 ].map(([words, look]) => '<span class="mark"><svg width="20" height="8" aria-hidden="true">'
-  + `<path d="M1,4H19" fill="none" ${look}/></svg> ${words}</span>`).join(" ");
+  + `<path d="M1,4H19" fill="none" ${look}/></svg> <span>${words}</span></span>`).join(" ");

@@ -5,6 +5,9 @@
 import { FieldMotion, Grid, PathForces, byPlace } from "./fields.js";
 import { divided, zeros } from "./numeric.js";
 
+// Cubic stiffness acts on a sinusoid 3/2 times as much as the mean of its square. Single lines change up to
+// several times as much as all, and free vibration after the start stretches the sheet, too.
+const HARMONIC = 1.5, WORST = 4.5;
 const RESIDUAL = 1e-5, MOST_STEPS = 300; // of the iteration for coupled modes
 
 /** A sheet of a pack. */
@@ -89,6 +92,29 @@ export class ModalBody {
       [direction, before] = [next, now];
     }
     return q;
+  }
+
+  /**
+   * Largest change of a line of a motion by the tension of the stretched sheet, relative to the strongest
+   * line. The tension follows the mean square of the slopes (see `skinwave.live.sheets.stretching_of`).
+   */
+  stretchingOf({ lines: { f }, forces, amplitudes }) {
+    const { slopes, tension } = this.stretching;
+    const squares = amplitudes.map((q, l) => slopes.reduce(
+      (sum, own, m) => sum + own * (q.re[m] ** 2 + q.im[m] ** 2), 0) / (f[l] ? 2 : 1));
+    const stretched = HARMONIC * tension * squares.reduce((sum, own) => sum + own, 0);
+    let change = 0, all = 0;
+    f.forEach((at, l) => {
+      if (!at) return;
+      const { re: dr, im: di } = this.stiffness(at), { re, im } = forces[l];
+      for (let m = 0; m < this.modes; m++) {
+        const [a, b] = divided(re[m], im[m], dr[m], di[m]);
+        const [c, d] = divided(re[m], im[m], dr[m] + stretched * slopes[m], di[m]);
+        all += a * a + b * b;
+        change += (a - c) ** 2 + (b - d) ** 2;
+      }
+    });
+    return all ? WORST * Math.sqrt(change / all) : 0;
   }
 
   /** The dynamic stiffness times modal coordinates (m,). */

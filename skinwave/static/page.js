@@ -4,12 +4,13 @@ import { addressOf, createHistory, readAddress } from "./address.js";
 import { NUMBERS_OF_MAPS, mapsOf, respond as respondTo } from "./answer.js";
 import { openBody } from "./bodies.js";
 import { buildControls } from "./controls.js";
-import { levelOver } from "./evaluate.js";
+import { MAP_LINE, levelOver } from "./evaluate.js";
+import { filmOf } from "./film.js";
 import { OVER, commandedPlot, difference, dispersionPlot, factorOf, fociAt, levelPlot, pathsOf, spanOf,
   spectrumPlot, waveformPlot } from "./figures.js";
-import { WRITERS, readMeasurement } from "./files.js";
-import { drawingFrequency, rhythmPeriod } from "./load.js";
-import { MAP_LEGEND, drawMap, mapControls } from "./maps.js";
+import { WRITERS, readMeasurement, readSession, samplesOf } from "./files.js";
+import { drawingFrequency, levelFactor, rhythmLevel, rhythmPeriod } from "./load.js";
+import { MAP_LEGEND, drawMap, mapControls, moveMap } from "./maps.js";
 import { largestOf } from "./numeric.js";
 import { createPlot, keptScales } from "./plots.js";
 import { offerSaves } from "./saving.js";
@@ -24,21 +25,33 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const $ = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
 
+const LOOKS = ["maps", "motion", "difference", "3d"];
 const SPANS = ["automatic", "last 60 ms", "all"];
-const PLAYED = 3.5; // s in which one period is played
+const PLAYED = 5, SHORTEST = 0.06; // s in which a part of the motion is played, and its least length
+const FEWER = 3; // curves per map while a control moves
 const SLICE = 30; // ms of slow work, after which the page draws
 const STEPS = { undo: -1, redo: 1 };
 const PAUSE = 300; // ms without a move, after which slow results are computed
 
 const opened = new Map(); // bodies by name
 const starts = { ...STARTS, ...data.start };
-const view = { look: "maps", tab: "lines", span: "automatic", highest: 600, over: "speed", mapDecibel: 0 };
+const view = { look: "maps", tab: "lines", span: "automatic", highest: "600", over: "speed", mapDecibel: 0 };
 const errors = new Map(); // sentences by control or file
 const scale = keptScales();
 let values = starts, answer = null, pinned = null, measured = null, history = null, controls = null;
 let curvesDue = 0, mapsDue = 0, levelsDue = 0, announcementDue = 0, moving = false;
-let levels = null, solid = null, solidAnswer = null;
+let levels = null, solid = null, solidKernel = null, solidAnswer = null, skipped = 0;
 let playing = 0, clock = 0, editing = null, notice = "";
+
+/** The surface of maps as a flat sheet for pictures of the kernel in three dimensions, in mm. */
+const flatSheet = (() => {
+  const n = MAP_LINE.length, points = new Float32Array(3 * n * n), triangles = [];
+  for (let p = 0; p < n * n; p++) points.set([1e3 * MAP_LINE[p % n], 1e3 * MAP_LINE[Math.floor(p / n)], 0], 3 * p);
+  for (let p = 0; p < n * (n - 1); p++) {
+    if ((p + 1) % n) triangles.push(p, p + 1, p + n, p + 1, p + n + 1, p + n);
+  }
+  return { points, triangles: Uint32Array.from(triangles) };
+})();
 
 const recordOf = (name) => data.bodies.find((body) => body.name === name) ?? data.bodies[0];
 
@@ -106,9 +119,9 @@ function fail(key, message) {
 
 function showMessages() {
   const problem = [...errors.values()].find(Boolean) ?? "";
-  const { title, error } = answer?.body ?? {};
+  const { title, error } = answer?.body ?? {}, whole = Math.hypot(error, answer?.stretching ?? 0);
   const accuracy = error && !answer.invalid
-    ? `${title}: error of the lines at most ${rounded(100 * error, 2)} %` : "";
+    ? `${title}: error of the lines at most ${rounded(100 * whole, 2)} %` : "";
   const warnings = [...new Set([...(answer?.body.warnings ?? []), ...(answer?.warnings ?? [])])];
   $("problem").textContent = problem;
   $("notice").textContent = problem ? "" : notice || accuracy;
@@ -135,20 +148,27 @@ function showCurves() {
   controls.show(values, drawnAt());
   showMessages();
   if (errors.has("load")) return;
-  const { load } = answer, span = spanOf(view.span, load);
-  const options = { pinned, measured, highest: view.highest,
-    scale: (name, largest) => scale(name, largest, moving) };
-  plots.commanded.draw(commandedPlot(answer, span));
-  plots.waveform.draw(waveformPlot(answer, span, options));
-  plots.spectrum.draw(spectrumPlot(answer, options));
+  const { load } = answer;
+  plots.commanded.draw(commandedPlot(answer, spanOf(view.span, load)));
+  showPlots();
   $("commanded-note").textContent = `${values.drive.replaceAll("_", " ")}, ${rounded(load.duration)} s`;
   showTiles();
   showPane();
-  mapsDue ||= requestAnimationFrame(showMaps);
+  if (!moving || skipped++ % FEWER === 0) mapsDue ||= requestAnimationFrame(showMaps);
   clearTimeout(levelsDue);
   levels = levels?.key === keyOfLevels() ? levels : null;
   if (view.tab === "level" && !levels) levelsDue = setTimeout(computeLevels, PAUSE);
 }
+
+function showPlots() {
+  const options = { pinned, measured, ...frequencies(),
+    scale: (name, largest) => scale(name, largest, moving) };
+  plots.waveform.draw(waveformPlot(answer, spanOf(view.span, answer.load), options));
+  plots.spectrum.draw(spectrumPlot(answer, options));
+}
+
+/** Highest frequency in Hz of the spectrum, and whether its axis is logarithmic. */
+const frequencies = () => ({ highest: parseFloat(view.highest), log: view.highest.endsWith("log") });
 
 /** Drawing frequency in Hz; NaN while the values contradict each other. */
 function drawnAt() {
@@ -159,10 +179,11 @@ function drawnAt() {
 
 function showMaps() {
   mapsDue = 0;
-  const before = answer.invalid ?? "";
+  const keyOf = ({ invalid, peaks }) => JSON.stringify([invalid ?? "", peaks]), before = keyOf(answer);
   Object.assign(answer, mapsOf(answer));
-  if (answer.invalid !== before) schedule(); // plots are hatched, too
-  clock %= period();
+  if (keyOf(answer) !== before) showPlots(); // which are hatched and scaled, too
+  showMessages();
+  clock %= played();
   showClock();
   showTiles();
   announce();
@@ -176,6 +197,10 @@ const short = (title) => (title.length > 22 ? `${title.slice(0, 21)}…` : title
 function drawMaps() {
   if (!answer?.maps || view.look === "3d") return;
   const a = pinned?.maps ? pinned : null, isDifference = view.look === "difference";
+  if (view.look === "motion") {
+    drawMotion();
+    return;
+  }
   const top = (name, rms) => scale(`map ${name}`, largestOf(rms), moving);
   const topOf = (own) => top(`waves ${own.body.name}`, own.maps.waves.rms);
   const common = (own) => ({ path: pathsOf(own.load), point: [own.x, own.y], influenced: own.maps.kernel.rms,
@@ -196,14 +221,63 @@ function drawMaps() {
   drawMap($("wave-map"), { ...common(answer), ...right, foci });
 }
 
+/** Draw the pressure of the kernel, or the waves of A, and the waves at the time of the clock. */
+function drawMotion() {
+  motionMaps().forEach((options, k) => drawMap($(["kernel-map", "wave-map"][k]), options));
+}
+
+/** Options of both maps at the time of the clock. */
+function motionMaps() {
+  const a = pinned?.maps ? pinned : null;
+  const b = answer, isPlaying = Boolean(playing), top = (name, largest) => scale(`motion ${name}`, largest, moving);
+  const common = (own) => ({ path: pathsOf(own.load), point: [own.x, own.y], foci: fociAt(own.load, now()),
+    influenced: own.maps.kernel.rms, moving: isPlaying, hatched: own.invalid });
+  const topOf = (own) => top(`waves ${own.body.name}`, own.maps.waves.crest);
+  const isAlike = a && factorOf(topOf(a), topOf(b)) === 1;
+  const waves = (own, title) => ({ ...common(own), rms: wavesNow(own), unit: "m", signed: true, title,
+    largest: isAlike ? Math.max(topOf(a), topOf(b)) : topOf(own) });
+  const left = a ? waves(a, `A: ${short(a.body.title)}, motion`) : { ...common(b), hatched: "",
+    rms: kernelNow(b), unit: "Pa", largest: top("kernel", b.peaks.kernel), title: "Kernel, pressure" };
+  return [left, waves(b, a ? `B: ${short(b.body.title)}, motion` : "Waves, motion into the body")];
+}
+
+/** Film of both maps, of what Play shows. */
+function film() {
+  const before = clock;
+  notify(`Recording ${PLAYED} s.`);
+  return filmOf((share) => { clock = share * played(); return motionMaps(); },
+    () => `${answer.body.title}. ${(1e3 * clock).toFixed(1)} ms; ${pace()}`, PLAYED)
+    .finally(() => { clock = before; });
+}
+
+const places = () => new Float32Array(MAP_LINE.length ** 2);
+
+/** Pressure of the kernel in Pa on the map at the time of the clock. */
+function kernelNow({ kernel }) {
+  const values = places();
+  kernel.snapshot(now(), MAP_LINE, MAP_LINE, values);
+  return values;
+}
+
+/** Steady motion in metre about the mean on the map at the time of the clock, with the level of a rhythm. */
+function wavesNow({ maps, load }) {
+  const values = places(), level = load.pulses ? levelFactor(load, rhythmLevel(load, now())) : 1;
+  maps.waves.at(now(), values);
+  return level === 1 ? values : values.map((v) => level * v);
+}
+
 function showSolid() {
   if (!answer) return;
-  solid ??= openView($("solid"), { onTime: (t) => { clock = t; showClock(); } });
+  solid ??= openView($("solid"), { onTime: (t) => { clock = t; solidKernel?.seek(t); } });
+  solidKernel ??= openView($("solid-kernel"), { follows: true });
   if (solidAnswer === answer) return;
   solidAnswer = answer;
-  const { body, waves, load, x, y } = answer, fd = drawingFrequency(load.path);
-  solid.show({ shape: body.shape, motion: { f: waves.f, ...waves.surface() }, path: pathsOf(load),
-    points: [[x, y]], foci: fd ? (t) => fociAt(load, t) : [fociAt(load, 0)] });
+  const { body, kernel, waves, load, x, y } = answer, fd = drawingFrequency(load.path);
+  const common = { path: pathsOf(load), points: [[x, y]], foci: fd ? (t) => fociAt(load, t) : [fociAt(load, 0)] };
+  solid.show({ ...common, shape: body.shape, motion: { f: waves.f, ...waves.surface() } });
+  const { re, im } = kernel.onGrid(MAP_LINE, MAP_LINE), up = (values) => values.map((v) => -v);
+  solidKernel.show({ ...common, shape: flatSheet, motion: { f: kernel.f, re: up(re), im: up(im) }, unit: "Pa",
+    period: solid.loop });
 }
 
 function showTiles() {
@@ -227,8 +301,8 @@ function announce() {
 function showPane() {
   if (view.tab === "lines") $("lines").innerHTML = linesTable(answer, pinned);
   else if (view.tab === "dispersion") {
-    plots.dispersion.draw(dispersionPlot(answer, view.highest));
     requestDispersion(answer.body);
+    plots.dispersion.draw(dispersionPlot(answer, frequencies().highest));
   } else if (view.tab === "level") {
     if (levels) plots.level.draw(levelPlot(answer, view.over, levels));
     $("best").disabled = !levels?.best || !answer.body.is_skin;
@@ -245,7 +319,10 @@ async function requestDispersion(body) {
   try {
     Object.assign(body, await request(data.api, "dispersion", body.toml));
     schedule();
-  } catch (error) { notify(error.message); }
+  } catch (error) {
+    body.hasFailed = true;
+    notify(error.message);
+  }
 }
 
 const keyOfLevels = () => JSON.stringify({ ...values, [view.over]: 0, over: view.over,
@@ -279,37 +356,57 @@ function showBody() {
 
 // ---- time -----------------------------------------------------------------------------------------
 
-/** Period in s of what is played. */
-function period() {
+/** Length in s of the part of the motion that is played, from the start of the plots' span. */
+function played() {
   const { load } = answer, fd = drawingFrequency(load.path);
-  if (load.pulses) return rhythmPeriod(load);
-  return 1 / (fd || load.am || load.envelope || 100);
+  const period = load.pulses ? rhythmPeriod(load) : 1 / (fd || load.am || load.envelope || 100);
+  return Math.min(Math.max(period, SHORTEST), load.duration);
 }
 
-/** Show the time on the slider, in the plots and on the maps. Plots show it in a period within their span. */
+const pace = () => `1 s shows ${rounded(1e3 * played() / PLAYED, 2)} ms`;
+
+/** Time in s that the clock shows. */
+const now = () => spanOf(view.span, answer.load)[0] + clock;
+
+/** Show the time on the slider and in the plots, and draw the maps. */
 function showClock() {
-  const whole = period(), start = Math.ceil(spanOf(view.span, answer.load)[0] / whole - 1e-9) * whole;
-  $("phase").value = (clock / whole) % 1;
-  $("phase-text").textContent = `${(1e3 * clock).toFixed(whole > 0.1 ? 0 : 2)} of ${rounded(1e3 * whole)} ms`;
-  for (const plot of [plots.commanded, plots.waveform]) plot.setCursor(clock ? 1e3 * (start + clock) : null);
+  showTime();
   drawMaps();
+}
+
+function showTime() {
+  const whole = played();
+  $("phase").value = clock / whole;
+  $("phase-text").textContent = `${(1e3 * clock).toFixed(whole > 0.1 ? 0 : 1)} ms; ${pace()}`;
+  for (const plot of [plots.commanded, plots.waveform]) plot.setCursor(clock ? 1e3 * now() : null);
+}
+
+/** Move both maps to the time of the clock. */
+function moveMaps() {
+  showTime();
+  motionMaps().forEach((options, k) => moveMap($(["kernel-map", "wave-map"][k]), options));
 }
 
 function play(on) {
   $("play").setAttribute("aria-pressed", String(on));
   $("play").textContent = on ? "❚❚ Pause" : "▶ Play";
   cancelAnimationFrame(playing);
+  const wasPlaying = playing;
   playing = 0;
-  if (!on) return;
+  if (!on) {
+    if (wasPlaying && answer) drawMaps();
+    return;
+  }
   let last = performance.now();
-  const next = (now) => {
-    const whole = period();
-    clock = (clock + Math.min(now - last, 100) / 1e3 * whole / PLAYED) % whole;
-    last = now;
-    showClock();
+  const next = (at) => {
+    const whole = played();
     playing = requestAnimationFrame(next);
+    clock = (clock + Math.min(at - last, 100) / 1e3 * whole / PLAYED) % whole;
+    last = at;
+    moveMaps();
   };
   playing = requestAnimationFrame(next);
+  look("motion");
 }
 
 // ---- bodies, scenes and measurements --------------------------------------------------------------
@@ -381,6 +478,30 @@ async function openMeasurement(file) {
   schedule();
 }
 
+async function openSession(file) {
+  try {
+    const session = readSession(await file.text(), file.name);
+    if (session.a) {
+      answer = respond(session.a);
+      pinned = withMaps();
+    }
+    set(session.b);
+    showPinned();
+    notify(`${file.name} is open.`);
+  } catch (error) { fail("session", error.message); }
+}
+
+/** Play the displacement at the point as sound. */
+function listenToPoint() {
+  const { samples, rate } = samplesOf(answer), context = new AudioContext();
+  const buffer = context.createBuffer(1, samples.length, rate), source = context.createBufferSource();
+  buffer.copyToChannel(Float32Array.from(samples), 0);
+  source.buffer = buffer;
+  source.connect(context.destination);
+  source.onended = () => context.close();
+  source.start();
+}
+
 function removeMeasurement() {
   measured = null;
   $("measured-clear").hidden = true;
@@ -404,10 +525,10 @@ function look(name) {
   view.look = name;
   press("look", name);
   const isSolid = name === "3d";
-  $("solid").hidden = !isSolid;
+  for (const id of ["solid", "solid-kernel"]) $(id).hidden = !isSolid;
   for (const part of all(".map, .foot, #map-legend")) part.toggleAttribute("hidden", isSolid);
-  $("map-scale").hidden = isSolid || name === "difference";
-  if (isSolid) play(false);
+  $("map-scale").hidden = name !== "maps";
+  if (name !== "motion") play(false);
   if (answer) { if (isSolid) showSolid(); else drawMaps(); writeAddress(); }
 }
 
@@ -423,11 +544,15 @@ const withMaps = () => ({ ...answer, ...mapsOf(answer) });
 
 function pin() {
   pinned = pinned ? null : withMaps();
+  showPinned();
+  if (pinned) notify("A is pinned. Change the body or a value to compare.");
+  tab(pinned ? "ab" : "lines");
+}
+
+function showPinned() {
   $("pin").setAttribute("aria-pressed", String(Boolean(pinned)));
   $("pin").textContent = pinned ? "Unpin A" : "Pin A";
   $("swap").disabled = !pinned;
-  if (pinned) notify("A is pinned. Change the body or a value to compare.");
-  tab(pinned ? "ab" : "lines");
 }
 
 function swap() {
@@ -499,16 +624,17 @@ function listen() {
   const on = (id, name, act) => $(id).addEventListener(name, act);
   for (const [id, way] of Object.entries(STEPS)) on(id, "click", () => restore(history.go(way)));
   const clicks = { pin, swap, link: copyLink, best: setToBest, "about-open": () => $("about").showModal(),
-    cancel: () => editing?.abort(), play: () => play(!playing) };
+    cancel: () => editing?.abort(), listen: listenToPoint, play: () => play(!playing) };
   for (const [id, act] of Object.entries(clicks)) on(id, "click", act);
   on("phase", "input", () => {
     play(false);
-    clock = Number($("phase").value) * period();
-    showClock();
+    clock = Number($("phase").value) * played();
+    if (view.look === "motion") showClock(); else look("motion");
+    showTime();
   });
   for (const key of ["span", "highest", "over"]) {
     on(key, "change", ({ target }) => {
-      view[key] = key === "highest" ? Number(target.value) : target.value;
+      view[key] = target.value;
       schedule();
     });
   }
@@ -521,6 +647,7 @@ function listen() {
   document.addEventListener("click", ({ target }) => {
     const button = target.closest("[data-preset], [data-save]");
     button?.closest("[popover]").hidePopover();
+    if (button?.dataset.save) play(false); // figures contain the maps
     if (button?.dataset.preset) applyPreset(data.presets[button.dataset.preset]);
   });
   on("page", "dragover", (event) => event.preventDefault());
@@ -531,6 +658,7 @@ function listen() {
   on("controls", "submit", (event) => event.preventDefault());
   on("controls", "change", ({ target }) => {
     if (target.id === "scene" && target.files[0]) openScene(target.files[0]);
+    if (target.id === "session" && target.files[0]) openSession(target.files[0]);
     if (target.id === "measurement" && target.files[0]) openMeasurement(target.files[0]);
   });
   on("measured-clear", "click", removeMeasurement);
@@ -545,7 +673,7 @@ function begin() {
   values = { ...own, body: recordOf(own.body).name };
   notice = refused.join(" ");
   showBody();
-  look(["maps", "3d", "difference"].includes(given.view) ? given.view : "maps");
+  look(LOOKS.includes(given.view) ? given.view : "maps");
   tab(["lines", "dispersion", "level", "ab"].includes(given.tab) ? given.tab : "lines");
   history = createHistory(values);
   writeAddress();
@@ -566,6 +694,7 @@ $("over").innerHTML = Object.keys(OVER).map((key) =>
 $("highest").value = view.highest;
 $("presets").innerHTML = data.presets.map(({ title }, k) => (
   `<button type="button" data-preset="${k}">${escaped(title)}</button>`)).join("");
-offerSaves($("save"), { answer: () => answer, notify, writers: WRITERS });
+offerSaves($("save"), { answer: () => ({ ...answer, pinned }), notify,
+  writers: [["Film of both maps, WebM", "waves.webm", "video/webm", film], ...WRITERS] });
 listen();
 begin();

@@ -36,6 +36,13 @@ function ticks(low, high, count) {
   return { values, step };
 }
 
+/** Values 1, 2 and 5 times powers of ten within [low, high], and a step below all of them. */
+function logarithmicTicks(low, high) {
+  const powers = Array.from({ length: 12 }, (_, k) => 10 ** (k - 4));
+  const values = powers.flatMap((power) => [power, 2 * power, 5 * power]);
+  return { values: values.filter((v) => v >= low * (1 - 1e-9) && v <= high * (1 + 1e-9)), step: 1 };
+}
+
 /** Return a number with as many decimals as its step needs. */
 function atStep(value, step) {
   const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
@@ -49,7 +56,7 @@ const subscripted = (name) => escaped(name).replace(/_(\w+)/g,
 /**
  * A plot inside an element.
  *
- * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, hatched, label }. A
+ * `draw(spec)` takes { x: {label, range, log}, y: {label, range, role}, y2, curves, names, hatched, label }. A
  * curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset}; names are [{x, y, axis,
  * text}], the most important first.
  */
@@ -67,8 +74,9 @@ export function createPlot(host, { announce }) {
 
   const area = () => [LEFT, TOP, size[0] - RIGHT, size[1] - BOTTOM];
   const toX = (v) => {
-    const [x0, , x1] = area(), [low, high] = spec.x.range;
-    return x0 + (x1 - x0) * (v - low) / (high - low || 1);
+    const [x0, , x1] = area(), scaled = (own) => (spec.x.log ? Math.log(Math.max(own, 1e-3)) : own);
+    const [low, high] = spec.x.range.map(scaled);
+    return x0 + (x1 - x0) * (scaled(v) - low) / (high - low || 1);
   };
   const toY = (v, axis) => {
     const [, y0, , y1] = area(), [low, high] = spec[axis].range;
@@ -94,7 +102,7 @@ export function createPlot(host, { announce }) {
   function axes(x0, y0, x1, y1) {
     const parts = [`<path class="axis" d="M${x0},${y0}V${y1}H${x1}${spec.y2 ? `V${y0}` : ""}"/>`];
     const [low, high] = spec.x.range, label = spec.x.label, room = 6 * label.length + 8;
-    const across = ticks(low, high, (x1 - x0) / 64);
+    const across = spec.x.log ? logarithmicTicks(low, high) : ticks(low, high, (x1 - x0) / 64);
     for (const v of across.values) {
       const x = toX(v).toFixed(1);
       parts.push(`<path class="grid" d="M${x},${y0}V${y1}"/>`);
@@ -229,9 +237,7 @@ export function createPlot(host, { announce }) {
   const place = (event) => event.clientX - svg.getBoundingClientRect().left;
   svg.addEventListener("pointermove", (event) => {
     if (!spec) return;
-    const [x0, , x1] = area(), [low, high] = spec.x.range, all = readings();
-    const x = low + (high - low) * (place(event) - x0) / (x1 - x0);
-    const index = nearest(all.map((each) => each.x), x);
+    const all = readings(), index = nearest(all.map((each) => toX(each.x)), place(event));
     selected = index >= 0 && Math.abs(toX(all[index].x) - place(event)) < READING_DISTANCE ? index : -1;
     drawMarks();
   });

@@ -1,8 +1,11 @@
 // The menu to save figures and data.
 
 import { escaped } from "./text.js";
+import { textOf } from "./values.js";
 
 const NS = "http://www.w3.org/2000/svg";
+const HEAD = 20; // px above a figure for its scene
+const SHOWN = [["amplitude"], ["am"], ["shape", "size", "speed"], ["peak", "height"], ["x", "y"]];
 const STYLED = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity",
   "fill-opacity", "font-size", "font-family", "font-weight", "paint-order"];
 
@@ -24,12 +27,12 @@ function standalone(svg, x, y) {
  * SVG {text, width, height} of elements of the page in their places: SVG, a canvas with `asSvg`, or the text
  * of others.
  */
-function figureOf(parts, paper) {
+function figureOf(parts, paper, title) {
   const visible = parts.filter((part) => part.getClientRects().length);
   const boxes = visible.map((part) => part.getBoundingClientRect());
   const left = Math.min(...boxes.map((b) => b.left)) - 8, top = Math.min(...boxes.map((b) => b.top)) - 8;
   const width = Math.max(...boxes.map((b) => b.right)) - left + 8;
-  const height = Math.max(...boxes.map((b) => b.bottom)) - top + 8;
+  const height = Math.max(...boxes.map((b) => b.bottom)) - top + 8 + HEAD;
   const inside = visible.map((part, k) => {
     const x = boxes[k].left - left, y = boxes[k].top - top;
     if (part instanceof SVGSVGElement) return standalone(part, x, y);
@@ -43,7 +46,9 @@ function figureOf(parts, paper) {
       font-size="${style.fontSize}" font-weight="${style.fontWeight}">${escaped(part.innerText)}</text>`;
   });
   const text = `<svg xmlns="${NS}" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}">
-<rect width="100%" height="100%" fill="${paper}"/>${inside.join("\n")}</svg>`;
+<rect width="100%" height="100%" fill="${paper}"/>
+<text x="8" y="15" font-family="sans-serif" font-size="11" fill="#777">${escaped(title)}</text>
+<g transform="translate(0, ${HEAD})">${inside.join("\n")}</g></svg>`;
   return { text, width, height };
 }
 
@@ -67,10 +72,11 @@ function download(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1e4);
 }
 
-/** Figure of the visible tiles, maps and plots of the page. */
-const figure = () => figureOf([...document.querySelectorAll(
-  "#tiles .tile > span, .map, #solid canvas, .plot-card h2, .plot, #pane .plot")],
-getComputedStyle(document.documentElement).getPropertyValue("--card"));
+/** Figure of the visible tiles, maps with their legend, and plots of the page, with its scene. */
+const figure = ({ values, body }) => figureOf([...document.querySelectorAll(
+  "#tiles .tile > span, .map, .solid canvas, #map-legend svg, #map-legend span span, .plot-card h2, .plot,"
+  + " #pane .plot")], getComputedStyle(document.documentElement).getPropertyValue("--card"),
+[body.title, ...SHOWN.map((keys) => keys.map((key) => textOf(key, values[key])).join(", "))].join("; "));
 
 /**
  * Fill the menu of files to save. `answer()` gives the present answer, `writers` write files: [[title, name,
@@ -78,8 +84,8 @@ getComputedStyle(document.documentElement).getPropertyValue("--card"));
  */
 export function offerSaves(menu, { answer, notify, writers }) {
   const items = [
-    ["Maps and plots, SVG", "skinwave.svg", "image/svg+xml", () => figure().text],
-    ["Maps and plots, PNG", "skinwave.png", "image/png", () => pngOf(figure())],
+    ["Maps and plots, SVG", "skinwave.svg", "image/svg+xml", (answer) => figure(answer).text],
+    ["Maps and plots, PNG", "skinwave.png", "image/png", (answer) => pngOf(figure(answer))],
     ...writers,
   ];
   menu.innerHTML = items.map(([title], k) => (

@@ -1,5 +1,7 @@
 // A moving surface for drawing: its extent, shading, strong lines and their sum at a time, and places on it.
 
+import { largestOf } from "./numeric.js";
+
 const STEEP = 0.3; // cosine of the slope below which a surface is shaded flat
 const NEGLIGIBLE = 3e-3; // of the strongest line at its largest: weaker lines are not drawn
 const CREST = 2; // times the largest RMS: end of the scale of colours
@@ -53,8 +55,8 @@ export function locate({ points, triangles }, x, y) {
 }
 
 /**
- * Strong lines of a motion re, im (l * n) of n points: {n, lines, crest}, with the largest amplitude of
- * each line, and CREST times the largest RMS.
+ * Strong lines of a motion re, im (l * n) of n points: {n, lines, largest, crest}, with the largest
+ * amplitude of each line (l,), and CREST times the largest RMS.
  */
 export function strongLines({ f, re, im }) {
   const n = f.length ? re.length / f.length : 0, lines = [], squares = new Float64Array(n);
@@ -69,7 +71,7 @@ export function strongLines({ f, re, im }) {
   }
   const most = Math.max(0, ...lines.map((line) => line.largest));
   const strong = lines.filter((line) => line.largest > NEGLIGIBLE * most);
-  return { n, lines: strong, crest: CREST * Math.sqrt(Math.max(0, ...squares)) };
+  return { n, lines: strong, largest: lines.map((line) => line.largest), crest: CREST * Math.sqrt(largestOf(squares)) };
 }
 
 /** Write the sum of lines at a time in s into `out` (n,). */

@@ -7,7 +7,8 @@ import { LABELS, STARTS, textOf } from "./values.js";
 
 const NONE = "–", SAME_LINE = 0.5; // Hz: lines of A and B this close are the same
 
-const fixed = (value, digits, unit) => (Number.isFinite(value) ? `${value.toFixed(digits)} ${unit}` : NONE);
+const fixed = (value, digits, unit) => (Number.isFinite(value)
+  ? `${value.toFixed(digits).replace(/^-(?=[0.]*[1-9])/, "−").replace("-", "")} ${unit}` : NONE);
 const percent = (share) => fixed(100 * share, share < 0.0995 ? 1 : 0, "%");
 const milliseconds = (seconds) => fixed(1e3 * seconds, 1, "ms");
 const distance = (reach) => (reach ? `${reach.beyond ? "> " : ""}${fixed(1e3 * reach.metre, 0, "mm")}`
@@ -22,13 +23,13 @@ function numbersOf({ body, level, reach, share, delay }) {
 }
 
 const TILES = {
-  level: ["Level at the point", "Level of the largest component above the detection threshold of skin, "
-    + "while a pulse is on"],
+  share: ["Motion outside the kernel's region",
+    "Share of the mean-square motion where the kernel is below −20 dB of its largest"],
   reach: ["Reach above threshold",
     "Largest distance from the path at which a component is above the detection threshold, "
     + "while a pulse is on"],
-  share: ["Outside the kernel's region",
-    "Share of the mean-square motion where the kernel is below −20 dB of its largest"],
+  level: ["Level at the point", "Level of the largest component above the detection threshold of skin, "
+    + "while a pulse is on"],
   delay: ["Delay", "Lag of the motion behind the pressure on the path, at the strongest component"],
 };
 
@@ -38,13 +39,13 @@ export function tiles(answer, pinned) {
   const line = level ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})${
     load.pulses ? ", pulse on" : ""}` : "";
   const onSkin = (text) => (body.is_skin ? text : "not skin, no threshold");
-  const details = { level: onSkin(line), reach: onSkin(reach ? "from the path" : ""), share: "of the motion",
+  const details = { level: onSkin(line), reach: onSkin(reach ? "from the path" : ""), share: "",
     delay: "behind the pressure" };
   const kernel = { level: answer.kernelLevel ? `${signed(answer.kernelLevel.dB)} dB` : "none", reach: distance(answer.kernelReach),
     share: percent(answer.kernelShare), delay: milliseconds(0) };
   return Object.entries(TILES).map(([key, [name, help]]) => `<div class="tile" title="${help}">
     <span class="name">${name}</span><span class="value">${own[key]}</span>
-    <span class="detail">${details[key]}</span><span class="kernel">kernel ${kernel[key]}</span>
+    <span class="kernel">kernel ${kernel[key]}</span><span class="detail">${details[key]}</span>
     <span class="of-a">${other ? `A: ${other[key]}` : ""}</span></div>`).join("");
 }
 

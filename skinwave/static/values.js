@@ -135,7 +135,7 @@ export function check(key, text) {
     throw new Error(`${label}: "${short(given)}" is not a number. Give ${range}.`);
   }
   if (value < least || value > high) {
-    throw new Error(`${label}: ${inUnit(value, unit)} is out of range. Give ${range}.`);
+    throw new Error(`${label}: ${inUnit(short(given), unit)} is out of range. Give ${range}.`);
   }
   if (key === "foci" && !Number.isInteger(value)) {
     throw new Error(`${label}: ${value} is not a whole number. Give ${range}.`);

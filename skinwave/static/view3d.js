@@ -54,9 +54,10 @@ const gradient = (table) => Array.from({ length: 17 }, (_, k) => {
 
 class View {
   constructor(container, options) {
-    const playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const playing = !options.follows && !matchMedia("(prefers-reduced-motion: reduce)").matches;
     Object.assign(this, { options, playing, time: 0, slower: 0, view: { ...HOME } });
     container.innerHTML = PANEL;
+    container.firstElementChild.classList.toggle("follows", Boolean(options.follows));
     for (const part of container.querySelectorAll("[data-part]")) this[part.dataset.part] = part;
     this.gl = this.canvas.getContext("webgl2", { antialias: true });
     if (!this.gl) {
@@ -137,7 +138,7 @@ class View {
       this.slow.value = this.slower;
     }
     const { crest } = strong, exact = 1e-3 * LARGEST_LIFT * width / crest;
-    const factor = crest ? Number(exact.toPrecision(1)) : 0;
+    const factor = crest && !this.options.follows ? Number(exact.toPrecision(1)) : 0;
     Object.assign(this, { strong, factor, largest: crest || 1, u: new Float32Array(strong.n),
       loop: period || Math.max(LOOP, 1 / Math.min(...strong.lines.map(({ f }) => f))) });
     this.time %= this.loop;
@@ -147,8 +148,8 @@ class View {
   describe() {
     const { unit = "m" } = this.scene, end = withUnit(this.largest, unit);
     const exaggerated = `Exaggerated ${this.factor.toLocaleString("en")} times, mean removed.`;
-    const caption = unit === "Pa" ? "Relief of the pressure. The kernel does not move." : exaggerated;
-    this.caption.textContent = this.factor ? caption : "Nothing moves.";
+    const ofPressure = `${this.factor ? "Relief of the pressure" : "Pressure"}. The kernel does not move.`;
+    this.caption.textContent = unit === "Pa" ? ofPressure : this.factor ? exaggerated : "Nothing moves.";
     const words = unit === "Pa" ? [`≥ ${end} less`, "mean pressure", `≥ ${end} more`]
       : [`≥ ${end} out of the body`, "0", `≥ ${end} into the body`];
     this.ends.innerHTML = words.map((text) => `<span>${text}</span>`).join("");
@@ -339,7 +340,8 @@ class View {
 /**
  * Open a view in an element that sets its size. `show` fills it.
  * @param {HTMLElement} container
- * @param {object} options onTime: called with the time in s as it changes
+ * @param {object} options onTime: called with the time in s as it changes; follows: whether another view
+ *   sets the time, so that there are no controls
  */
 export function openView(container, options = {}) {
   return new View(container, options);

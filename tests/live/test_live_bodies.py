@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from in_browser import needs_browser
 
-from simple_model import MovingPressure, Rhythm, Tacton, from_young, sensation_level
+from simple_model import MovingPressure, Rhythm, Tacton, Trajectory, from_young, sensation_level
 from simple_model.load.line_names import during_pulses
 from skinwave.bodies.supports import Mounting
 from skinwave.live import elements
@@ -37,6 +37,10 @@ PLACES = """({ name, values, k }) => {
 LEVEL = """({ name, values }) => {
   const motion = bodies[name].respond(loadOf(values));
   return levelOf(motion.f, motion.at(values.x / 1e3, values.y / 1e3)).dB;
+}"""
+STRETCHING = """(values) => {
+  const body = bodies["paper-sheet"];
+  return body.stretchingOf(body.respond(loadOf(values)));
 }"""
 H = 0.012  # m: size of the palm's elements in this test
 
@@ -125,3 +129,31 @@ def test_a_body_of_elements(page, monkeypatch):
     for scene in made[:2]:
         u = np.abs(answer(page, "palm", scene)["u"])
         assert u[0] < 1e-5 * u.max()
+
+
+@pytest.mark.parametrize(("speed", "peak"), [(12.0, 50.0), (12.0, 25.0), (0.0, 50.0)])
+def test_a_sheet_states_what_stretching_changes(page, speed, peak):
+    """At the lines of the load, which the free vibration after the start does not change."""
+    body = BODIES["paper-sheet"]
+    circle = Trajectory(shape="circle", size=0.02, speed=speed) if speed else Trajectory()
+    tacton = Tacton(am_frequency=140, trajectory=circle, duration=0.5)
+    places = ((0.0, 0.0), (0.01, 0.0), (0.02, 0.01), (0.03, -0.02), (-0.015, 0.03))
+    pressure = MovingPressure(tacton=tacton, peak_pressure=peak)
+    scene = Scene(pressure=pressure, body=body, probes=places)
+    linear, stretched = (
+        compute(scene, m) for m in ("plate-modes-transient", "plate-modes-nonlinear")
+    )
+    t, drawn = linear.times, speed / (np.pi * 0.02)
+    f = np.unique([abs(140 * i + drawn * j) for i in range(-2, 3) for j in range(-3, 4)])
+    f = f[(f > 20) & (f < 600)]
+    window = np.hanning(len(t)) ** 2 * 2 / (np.hanning(len(t)) ** 2).sum()
+    turn = np.exp(-2j * np.pi * np.outer(f, t)) * window
+    a, b = (turn @ (r.displacement - r.displacement.mean(axis=0)) for r in (linear, stretched))
+    strong, largest = np.abs(b) > 10 ** (-30 / 20) * np.abs(b).max(), np.abs(b).max(axis=0)
+    true = np.where(strong, np.abs(a - b) / largest, 0).max()
+    open_body(page, "paper-sheet", pack_of(body))
+    stated = page.evaluate(
+        STRETCHING, control_values(replace(scene, probes=places[:1]), "paper-sheet")
+    )
+    assert true < 1.1 * np.hypot(stated, 0.01)
+    assert stated < 6 * true

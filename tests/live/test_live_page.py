@@ -211,7 +211,7 @@ def test_a_preset_is_compared_with_a_pinned_result(opened):
 
 
 def level(tab):
-    shown = tab.inner_text("#tiles .value >> nth=0").removesuffix(" dB")
+    shown = tab.inner_text("#tiles .value >> nth=2").removesuffix(" dB")
     return int(shown.replace("\N{MINUS SIGN}", "-"))
 
 
@@ -231,3 +231,43 @@ def test_saved_files_and_a_measurement(opened, tmp_path):
     tab.evaluate("document.querySelector('#files').open = true")
     tab.click("#measured-clear")
     tab.locator("#waveform .is-measured").first.wait_for(state="detached")
+
+
+@needs_browser
+def test_waves_move_beside_a_kernel_that_is_silent_outside(opened):
+    tab = opened()
+    tab.click("#play")
+    pixels = """() => ["kernel-map", "wave-map"].map((id) => {
+      const canvas = document.getElementById(id).previousElementSibling, n = canvas.width;
+      const { data } = canvas.getContext("2d").getImageData(0, Math.floor(n / 10), n, 1);
+      return [...data].join();
+    })"""
+    before = tab.evaluate(pixels)
+    tab.wait_for_function(f"(before) => ({pixels})()[1] !== before[1]", arg=before)
+    assert tab.evaluate(pixels)[0] == before[0]
+    tab.click("#play")
+    assert tab.locator("#wave-map image").count() == 2  # the map, in the picture that is saved
+    assert "1 s shows 12 ms" in tab.inner_text("#phase-text")
+    assert [said for said in tab.messages[1:] if "readback" not in said] == []
+
+
+@needs_browser
+def test_a_session_keeps_both_results(opened, tmp_path):
+    tab = opened()
+    tab.click("#pin")
+    tab.fill("#am-field", "80")
+    tab.keyboard.press("Tab")
+    tab.click("[popovertarget=save]")
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name="Session").click()
+    file = tmp_path / "session.json"
+    saved.value.save_as(file)
+    other = opened()
+    other.set_input_files("#session", file)
+    other.locator("#notice", has_text="is open").wait_for()
+    other.click("#tab-ab")
+    assert other.inner_text("#ab") == (tab.click("#tab-ab") or tab.inner_text("#ab"))
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text('{"format": "skinwave live session", "b": {"am": "fast"}}')
+    other.set_input_files("#session", wrong)
+    other.locator("#problem", has_text="is not a number").wait_for()

@@ -22,7 +22,8 @@ SCENE = b'name = "s"\n[tacton]\nam_frequency_hz = 90\n[body]\npreset = "skin-sla
 
 class Client:
     def __init__(self, base="/"):
-        self.server = serve.Server(DATA, base=base, token="right")
+        self.server = serve.Server(base=base, token="right")
+        self.server.show(DATA)
         self.thread = threading.Thread(target=self.server.serve_forever, daemon=True)
         self.thread.start()
 
@@ -84,7 +85,7 @@ def test_a_proxy_with_a_prefix():
             assert answer.status == 200
         for wrong in ("//evil.example/", "/a b/", "/a", '/"/', "/a\r\nX: b/"):
             with pytest.raises(ValueError, match="path"):
-                serve.Server(DATA, base=wrong)
+                serve.Server(base=wrong)
         for path in (f"{base}api/scene", "/api/scene"):
             status, found = client.post(path, SCENE, Host="hub.example")
             assert (status, found["values"]["am"]) == (200, 90)
