@@ -10,7 +10,7 @@ import { rounded, signed } from "./text.js";
 import { NUMBERS } from "./values.js";
 
 export const OVER = { speed: [0.5, 40], size: [2, 60], am: [10, 400], height: [100, 400] };
-const FEWEST_POINTS = 700, LONGEST_STEP = 2.5e-4; // of a waveform; s between its points
+const FEWEST_POINTS = 450, LONGEST_STEP = 2.5e-4; // of a waveform; s between its points
 const POINTS_PER_PERIOD = 12, MOST_POINTS = 6000; // of the commanded signal
 const LEVEL_RANGE = 60; // dB that the plot of levels over a control shows
 const STEM_SPACING = 3.5; // px between stems of the same line

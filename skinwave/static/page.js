@@ -12,7 +12,7 @@ import { WRITERS, readMeasurement, readSession, samplesOf } from "./files.js";
 import { drawingFrequency, levelFactor, rhythmLevel, rhythmPeriod } from "./load.js";
 import { MAP_LEGEND, drawMap, mapControls, moveMap } from "./maps.js";
 import { largestOf } from "./numeric.js";
-import { createPlot, keptScales } from "./plots.js";
+import { createPlot, keptScales, niceTop } from "./plots.js";
 import { offerSaves } from "./saving.js";
 import { runSelftest } from "./selftest.js";
 import { request, sendFile } from "./server.js";
@@ -179,7 +179,8 @@ function drawnAt() {
 
 function showMaps() {
   mapsDue = 0;
-  const keyOf = ({ invalid, peaks }) => JSON.stringify([invalid ?? "", peaks]), before = keyOf(answer);
+  const keyOf = ({ invalid, peaks = {} }) => [invalid ?? "", ...Object.values(peaks).map(niceTop)].join();
+  const before = keyOf(answer);
   Object.assign(answer, mapsOf(answer));
   if (keyOf(answer) !== before) showPlots(); // which are hatched and scaled, too
   showMessages();
