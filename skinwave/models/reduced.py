@@ -52,7 +52,7 @@ from skinwave.typing import Bools, Floats
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
 REDUCTION_TOLERANCE, REDUCTION_SHARE = 4e-3, 1 / 15  # at most, and of the waveform's
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = "reduced 12"  # of a cached body
+FORMAT = "reduced 13"  # of a cached body
 MANY_OUTPUTS = 24  # from where a body is reduced for one path, whose load has about as many parts
 PATH_SHARE = 3  # of that tolerance: error of the load along a path
 NEGLIGIBLE_LINE_RATIO = 1e-7  # to the strongest line at the probes

@@ -47,6 +47,20 @@ def test_a_prepared_body_comes_from_the_cache_unchanged(tmp_path, monkeypatch):
     assert "reduce" in phases  # another mesh is another entry
 
 
+@pytest.mark.parametrize("stiffer", [0.1, 4.0])
+def test_the_expansion_point_follows_the_lowest_natural_frequency(stiffer, monkeypatch):
+    """Frequencies follow the speed of shear waves over the depth."""
+    shear = stiffer * SLAB.solid.shear_modulus
+    soft = replace(SLAB.solid, shear_modulus=shear, viscosity=SLAB.solid.viscosity * stiffer**0.5)
+    body = replace(SLAB, material=soft)
+    points = [meshed.expansion_point(each, build(each, 0.008)) for each in (SLAB, body)]
+    assert points[1] == pytest.approx(points[0] * np.sqrt(stiffer), rel=1e-6)
+    scene = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=ON_X)
+    found = prepare(scene, SolveOptions(h=0.008)).effort.reduced_dofs
+    monkeypatch.setattr(meshed, "expansion_point", lambda *_: points[0])
+    assert found < prepare(scene, SolveOptions(h=0.008, tolerance=0.0499)).effort.reduced_dofs
+
+
 def test_a_body_with_many_probes_is_reduced_for_its_path():
     few = Scene(pressure=MovingPressure(tacton=CIRCLE), body=SLAB, probes=ON_X)
     places = np.random.default_rng(0).uniform(-0.015, 0.015, (60, 2))

@@ -11,7 +11,7 @@ from corpus import FREE, SHORT
 
 import skinwave.planning.extent
 from bench.plans import MOST, stated_and_true
-from simple_model import Material, MovingPressure, Tacton, Trajectory
+from simple_model import Effort, Material, MovingPressure, Tacton, Trajectory
 from skinwave import SkinwaveWarning, loads, simulate
 from skinwave.bodies.build import build
 from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
@@ -23,7 +23,13 @@ from skinwave.models.reduced import answer, prepare
 from skinwave.planning.estimates import cutoff_frequency, side_reflections
 from skinwave.planning.extent import absorbing_error, extent
 from skinwave.planning.plan import plan
-from skinwave.planning.refinement import SizeController, above_band, element_sizes, refine
+from skinwave.planning.refinement import (
+    SizeController,
+    above_band,
+    element_sizes,
+    refine,
+    refinement_ratio,
+)
 from skinwave.planning.simulate import compute
 from skinwave.results.comparison import compare
 from skinwave.scene.scene import BODIES, Body, Layer, Scene, Sides
@@ -291,6 +297,14 @@ def test_lines_beyond_a_third_of_the_tolerance_are_left_out():
     frequencies = np.array([0.0, 100.0, 200.0, 300.0])
     found = [cutoff_frequency(frequencies, shares, x) for x in (0.02, 0.2, 0.5, 1.0)]
     assert found == [300, 200, 100, 0]
+
+
+def test_meshes_from_files_are_compared_by_their_elements_under_the_focus():
+    coarse, fine = Effort(cells=1000, h=0.01), Effort(cells=1728, h=0.005)
+    assert refinement_ratio(Body(kind="palm"), coarse, fine) == pytest.approx(1.2)
+    scan = Body(kind="mesh", file="hand.stl")
+    assert refinement_ratio(scan, coarse, fine) == 2
+    assert refinement_ratio(scan, coarse, replace(fine, cells=1000)) == 1  # the same mesh
 
 
 def test_motion_above_the_band_is_an_error_of_twice_its_energy():

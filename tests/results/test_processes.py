@@ -17,13 +17,27 @@ from threadpoolctl import ThreadpoolController, threadpool_info
 
 from skinwave.commands import common
 from skinwave.commands.cli import main
-from skinwave.system.effort import one_thread
+from skinwave.system.effort import one_thread, usable_cores
 from skinwave.system.plain_text import cell, csv_table, printable, say
-from skinwave.system.processes import environment, pool
+from skinwave.system.processes import beside, environment, pool
 from skinwave.system.progress_bar import expecting
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 HOSTILE = "a\x1b[2Jb\x07c\x9bd\x7fe\u202ef\u2066g\x00h\ud800i"
+
+
+def begins():
+    with beside() as begin:
+        return begin is not None and begin(os.getpid).result() == os.getpid()
+
+
+@pytest.mark.skipif(usable_cores() < 2, reason="one core")
+def test_calls_begin_beside_others_unless_processes_have_all_cores():
+    assert begins()
+    with pool(usable_cores() - 1) as workers:
+        assert not begins()
+        assert not workers.submit(begins).result()
+    assert begins()
 
 
 def test_modules_of_the_working_folder_are_not_imported(tmp_path):
