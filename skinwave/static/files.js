@@ -51,6 +51,42 @@ export function sceneToml(values, record) {
     `[focus]\n${table(focus)}`, record.toml.trim(), `[probes]\n${table(probes)}`].join("\n\n") + "\n";
 }
 
+// Keys of a scene file that are values of a control, and what these are multiplied by.
+const KEYS = {
+  "tacton.amplitude_percent": "amplitude", "tacton.am_frequency_hz": "am", "tacton.second_am_frequency_hz": "am2",
+  "tacton.envelope_frequency_hz": "envelope", "tacton.duration_s": "duration", "tacton.shape": "shape",
+  "tacton.size_mm": "size", "tacton.speed_m_per_s": "speed", "tacton.sweep": "sweep", "tacton.sharing": "sharing",
+  "tacton.rhythm.ramp_ms": "ramp", "focus.height_mm": "height", "focus.drive": "drive", "focus.profile": "profile",
+  "focus.peak_pressure_pa": "peak", "probes.quantity": "quantity",
+};
+
+/**
+ * Values of the controls in a scene file that this page has saved; the body is one of `bodies` with the same
+ * table. Throws an Error with a sentence for users if the file holds something else.
+ */
+export function readScene(text, name, bodies) {
+  const refuse = (sentence) => { throw new Error(`${name}: ${sentence} Use skinwave web, which opens any scene.`); };
+  const given = {}, values = { ...STARTS };
+  let table = "";
+  for (const line of text.split(/\r?\n/)) {
+    const [, head] = line.match(/^\[([\w.]+)\]$/) ?? [], [, key, value] = line.match(/^(\w+) = (.+)$/) ?? [];
+    if (head) table = `${head}.`;
+    if (!key) continue;
+    try { given[table + key] = JSON.parse(value); } catch { given[table + key] = value; }
+  }
+  if (given.name !== NAME) refuse("it is no scene that this page has saved.");
+  if (given["tacton.shape"] === "recorded") refuse("own paths are kept in a session only.");
+  for (const [key, own] of Object.entries(KEYS)) if (key in given) values[own] = check(own, given[key]);
+  const rows = (key) => (given[key] ?? []).map((row) => row.join("/")).join(", "), foci = given["tacton.foci"];
+  const set = { ratio: given["tacton.superposition"].join(":"), foci: foci.length, pulses: rows("tacton.rhythm.pulses_ms"),
+    phases: foci.length > 1 ? foci.map((own) => Number((100 * own).toPrecision(9))).join(", ") : "",
+    polyline: rows("tacton.points_mm"), modulation: Number((100 * given["focus.depth_of_modulation"]).toPrecision(9)),
+    x: given["probes.points_mm"][0][0], y: given["probes.points_mm"][0][1] };
+  for (const [key, own] of Object.entries(set)) values[key] = check(key, own);
+  const own = bodies.find((body) => text.includes(body.toml.trim()));
+  return { ...values, body: (own ?? refuse("its body is not one of this page.")).name };
+}
+
 const timesOf = ({ duration }) => Float64Array.from({ length: Math.max(2, Math.round(duration * RATE)) },
   (_, k) => k / RATE);
 

@@ -8,7 +8,7 @@ import { MAP_LINE, levelOver } from "./evaluate.js";
 import { filmOf } from "./film.js";
 import { OVER, commandedPlot, difference, dispersionPlot, factorOf, fociAt, levelPlot, pathsOf, spanOf,
   spectrumPlot, waveformPlot } from "./figures.js";
-import { WRITERS, readMeasurement, readSession, samplesOf } from "./files.js";
+import { WRITERS, readMeasurement, readScene, readSession, samplesOf } from "./files.js";
 import { drawingFrequency, levelFactor, rhythmLevel, rhythmPeriod } from "./load.js";
 import { MAP_LEGEND, drawMap, mapControls, moveMap } from "./maps.js";
 import { largestOf } from "./numeric.js";
@@ -481,7 +481,8 @@ async function openMeasurement(file) {
 
 async function openSession(file) {
   try {
-    const session = readSession(await file.text(), file.name);
+    const text = await file.text(), isScene = file.name.endsWith(".toml");
+    const session = isScene ? { b: readScene(text, file.name, data.bodies) } : readSession(text, file.name);
     if (session.a) {
       answer = respond(session.a);
       pinned = withMaps();

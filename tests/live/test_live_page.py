@@ -271,3 +271,22 @@ def test_a_session_keeps_both_results(opened, tmp_path):
     wrong.write_text('{"format": "skinwave live session", "b": {"am": "fast"}}')
     other.set_input_files("#session", wrong)
     other.locator("#problem", has_text="is not a number").wait_for()
+
+
+@needs_browser
+def test_a_saved_scene_opens_again(opened, tmp_path):
+    part = (
+        "#am=93&shape=polyline&polyline=0/0, 10/5, 12/-3&foci=2&phases=0, 30&pulses=100/50&x=4&y=-2"
+    )
+    tab = opened(part=part)
+    tab.click("[popovertarget=save]")
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name="Scene, TOML").click()
+    saved.value.save_as(tmp_path / "scene.toml")
+    other = opened()
+    other.set_input_files("#session", tmp_path / "scene.toml")
+    other.locator("#notice", has_text="is open").wait_for()
+    assert other.evaluate("location.hash") == tab.evaluate("location.hash")
+    (tmp_path / "other.toml").write_text('name = "other"\n')
+    other.set_input_files("#session", tmp_path / "other.toml")
+    other.locator("#problem", has_text="skinwave web").wait_for()
