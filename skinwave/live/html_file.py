@@ -25,7 +25,7 @@ from skinwave.system.templates import render
 
 TITLE = "skinwave: waves in skin and paper under mid-air ultrasound haptics"
 DEFAULT_BODIES = ("skin-slab", "paper-sheet", "palm")
-TESTS = 20  # Tactons of a self-test
+TESTS = 60  # random Tactons of the self-test, of all bodies together
 
 
 def page(data: Mapping[str, Any], title: str = TITLE) -> str:

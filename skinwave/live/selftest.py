@@ -23,10 +23,10 @@ from skinwave.system.effort import Clock, silent
 from skinwave.typing import Complex, Floats
 
 SEED = 15
-# Compared lines: smallest amplitude relative to the largest at the point, and highest frequency in
-# Hz. The pack of a body of elements is less accurate.
-SMALLEST, HIGHEST = 0.01, 1000.0
-SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS = 0.3, 200.0
+# Compared lines: smallest amplitude relative to the largest at the point, highest frequency in Hz,
+# and fewest of a Tacton. The pack of a body of elements is less accurate.
+SMALLEST, HIGHEST, FEWEST = 0.01, 1000.0, 3
+SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS, FEWEST_OF_ELEMENTS = 0.3, 200.0, 1
 SHAPES = ("point", "line", "circle", "triangle", "square")
 DRIVES = ("pressure_squared", "force_corrected", "linear")
 # Places in m at which the exact model of a body of elements is prepared.
@@ -49,16 +49,17 @@ def selftest(
     rng = np.random.default_rng(SEED)
     records: list[dict[str, Any]] = []
     lines_of, _, places = exact(body)
-    smallest, highest = (
-        (SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS) if places else (SMALLEST, HIGHEST)
-    )
+    smallest, highest, fewest = SMALLEST, HIGHEST, FEWEST
+    if places:
+        smallest, highest = SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS
+        fewest = FEWEST_OF_ELEMENTS
     while len(records) < count:
         scene = random_scene(body, rng, lowest, places)
         f, amplitudes = lines_of(scene)
         size = np.abs(amplitudes)
         compared = (f > 0) & (f <= highest)
         compared &= size > smallest * size[(f > 0) & (f <= HIGHEST)].max(initial=0.0)
-        if not compared.any():  # a focus that neither moves nor is modulated
+        if compared.sum() < fewest:  # such as a focus that neither moves nor is modulated
             continue
         lines = zip(f[compared].tolist(), amplitudes[compared].tolist(), strict=True)
         records.append({

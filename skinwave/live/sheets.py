@@ -35,7 +35,7 @@ from skinwave.typing import Floats
 STEP, SIDE = 3e-3, 37  # m between places of the grid of fields, and number of places along a side
 LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last value
 LOWEST = 0.1  # m: lowest height of the focus
-ERROR = 0.01  # relative, of lines above -40 dB; it is larger for several foci on a wide path
+ERROR = 0.02  # relative, of lines above -40 dB; it is larger for several foci on a wide path
 SLOPES = 81  # places along a side, for gradients of modes
 TYPICAL, TOLERANCE = 140.0, 0.05  # Hz and relative error, for a warning about thick sheets
 BAND = 1300.0  # Hz: modes below are kept, modes above are combined

@@ -141,7 +141,7 @@ export class PathForces {
  */
 export class FieldMotion {
   constructor(body, load) {
-    Object.assign(this, { body, load, lines: loadLines(load, { lowest: 0, most: 120 }) });
+    Object.assign(this, { body, load, lines: loadLines(load, { lowest: 0 }) });
     const { f, w, samples } = this.lines, { width } = body, along = body.pushed.along(load, samples);
     this.forces = w.map(({ re: wr, im: wi }) => {
       const { re, im } = zeros(width);

@@ -290,7 +290,7 @@ export function pathHarmonic(load, n, count) {
  * Re sum_q w_q S(x - X_q) exp(2 pi i f t). The `parts` of a line are harmonics n of the path times lines
  * {re, im} of the gain.
  */
-export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 1000, most = 60 } = {}) {
+export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 1000, most = 120 } = {}) {
   const samples = pathSamples(load), count = samples.x.length, gain = gainLines(load);
   const fd = drawingFrequency(load.path);
   const last = lastOrder(load, count, gain, highest), byFrequency = new Map();

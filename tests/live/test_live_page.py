@@ -115,7 +115,7 @@ def test_the_command_writes_one_file(file, capsys, tmp_path):
     assert [body["name"] for body in data["bodies"]] == ["skin-slab"]
     assert data["start"]["am"] == 140
     assert data["presets"][0]["title"] == "circle on skin"
-    assert len(data["selftest"]) == 20
+    assert len(data["selftest"]) == 60
     assert file.stat().st_size < 1.5e6
     (tmp_path / "bad.toml").write_text("[tacton]\nshape = 3\n")
     for words, out in (([], file), ([str(tmp_path / "bad.toml")], tmp_path / "a.html")):
