@@ -41,9 +41,11 @@ export const NUMBERS_OF_MAPS = ["maps", "peaks", "share", "kernelShare", "reach"
  */
 export function mapsOf(answer) {
   const { kernel, waves, load, body } = answer;
-  const maps = { kernel: mapOf(kernel), waves: mapOf(waves) }, { rate } = QUANTITIES[answer.values.quantity];
+  const maps = { kernel: mapOf(kernel), waves: mapOf(waves) };
+  const { rate } = QUANTITIES[answer.values.quantity];
   return {
-    maps, peaks: { kernel: peakAt(kernel, maps.kernel.strongest), waves: peakAt(waves, maps.waves.strongest, rate) },
+    maps, peaks: { kernel: peakAt(kernel, maps.kernel.strongest),
+      waves: peakAt(waves, maps.waves.strongest, rate) },
     share: shareOutside(maps.kernel.rms, maps.waves.rms),
     kernelShare: shareOutside(maps.kernel.rms, maps.kernel.rms),
     reach: body.is_skin ? reach(load, maps.waves) : null, kernelReach: reach(load, maps.kernel),
@@ -65,8 +67,9 @@ function validity({ body, waves, x, y }) {
       invalid: ratio > LARGE_DEFLECTION ? `linear model, ${ratio.toPrecision(2)} × thickness` : "" };
   }
   const stretching = body.stretchingOf(waves);
-  return { stretching, invalid: stretching > TOLERANCE
-    ? `stretching is left out: error ${stretching < 0.5 ? (100 * stretching).toPrecision(2) : "above 50"} %` : "" };
+  const percent = stretching < 0.5 ? (100 * stretching).toPrecision(2) : "above 50";
+  return { stretching,
+    invalid: stretching > TOLERANCE ? `stretching is left out: error ${percent} %` : "" };
 }
 
 function warnings({ load, body }) {

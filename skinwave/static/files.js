@@ -53,11 +53,12 @@ export function sceneToml(values, record) {
 
 // Keys of a scene file that are values of a control, and what these are multiplied by.
 const KEYS = {
-  "tacton.amplitude_percent": "amplitude", "tacton.am_frequency_hz": "am", "tacton.second_am_frequency_hz": "am2",
-  "tacton.envelope_frequency_hz": "envelope", "tacton.duration_s": "duration", "tacton.shape": "shape",
-  "tacton.size_mm": "size", "tacton.speed_m_per_s": "speed", "tacton.sweep": "sweep", "tacton.sharing": "sharing",
-  "tacton.rhythm.ramp_ms": "ramp", "focus.height_mm": "height", "focus.drive": "drive", "focus.profile": "profile",
-  "focus.peak_pressure_pa": "peak", "probes.quantity": "quantity",
+  "tacton.amplitude_percent": "amplitude", "tacton.am_frequency_hz": "am",
+  "tacton.second_am_frequency_hz": "am2", "tacton.envelope_frequency_hz": "envelope",
+  "tacton.duration_s": "duration", "tacton.shape": "shape", "tacton.size_mm": "size",
+  "tacton.speed_m_per_s": "speed", "tacton.sweep": "sweep", "tacton.sharing": "sharing",
+  "tacton.rhythm.ramp_ms": "ramp", "focus.height_mm": "height", "focus.drive": "drive",
+  "focus.profile": "profile", "focus.peak_pressure_pa": "peak", "probes.quantity": "quantity",
 };
 
 /**
@@ -65,23 +66,32 @@ const KEYS = {
  * table. Throws an Error with a sentence for users if the file holds something else.
  */
 export function readScene(text, name, bodies) {
-  const refuse = (sentence) => { throw new Error(`${name}: ${sentence} Use skinwave web, which opens any scene.`); };
+  const refuse = (sentence) => {
+    throw new Error(`${name}: ${sentence} Use skinwave web, which opens any scene.`);
+  };
   const given = {}, values = { ...STARTS };
   let table = "";
   for (const line of text.split(/\r?\n/)) {
-    const [, head] = line.match(/^\[([\w.]+)\]$/) ?? [], [, key, value] = line.match(/^(\w+) = (.+)$/) ?? [];
+    const [, head] = line.match(/^\[([\w.]+)\]$/) ?? [];
+    const [, key, value] = line.match(/^(\w+) = (.+)$/) ?? [];
     if (head) table = `${head}.`;
     if (!key) continue;
     try { given[table + key] = JSON.parse(value); } catch { given[table + key] = value; }
   }
   if (given.name !== NAME) refuse("it is no scene that this page has saved.");
+  const lists = ["tacton.superposition", "tacton.foci", "probes.points_mm"];
+  if (!lists.every((key) => Array.isArray(given[key]))) refuse("it is incomplete.");
   if (given["tacton.shape"] === "recorded") refuse("own paths are kept in a session only.");
   for (const [key, own] of Object.entries(KEYS)) if (key in given) values[own] = check(own, given[key]);
-  const rows = (key) => (given[key] ?? []).map((row) => row.join("/")).join(", "), foci = given["tacton.foci"];
-  const set = { ratio: given["tacton.superposition"].join(":"), foci: foci.length, pulses: rows("tacton.rhythm.pulses_ms"),
-    phases: foci.length > 1 ? foci.map((own) => Number((100 * own).toPrecision(9))).join(", ") : "",
-    polyline: rows("tacton.points_mm"), modulation: Number((100 * given["focus.depth_of_modulation"]).toPrecision(9)),
-    x: given["probes.points_mm"][0][0], y: given["probes.points_mm"][0][1] };
+  const rows = (key) => (given[key] ?? []).map((row) => row.join("/")).join(", ");
+  const percent = (share) => Number((100 * share).toPrecision(9)), foci = given["tacton.foci"];
+  const [[x, y]] = given["probes.points_mm"];
+  const set = {
+    ratio: given["tacton.superposition"].join(":"), foci: foci.length,
+    phases: foci.length > 1 ? foci.map(percent).join(", ") : "",
+    pulses: rows("tacton.rhythm.pulses_ms"), polyline: rows("tacton.points_mm"),
+    modulation: percent(given["focus.depth_of_modulation"]), x, y,
+  };
   for (const [key, own] of Object.entries(set)) values[key] = check(key, own);
   const own = bodies.find((body) => text.includes(body.toml.trim()));
   return { ...values, body: (own ?? refuse("its body is not one of this page.")).name };
@@ -140,7 +150,9 @@ export const sessionJson = ({ values, pinned }) => `${JSON.stringify({ format: S
 export function readSession(text, name) {
   let found = {};
   try { found = JSON.parse(text); } catch { /* not JSON */ }
-  if (found?.format !== SESSION) throw new Error(`${name} is no session of this page. Choose a file from Save.`);
+  if (found?.format !== SESSION) {
+    throw new Error(`${name} is no session of this page. Choose a file from Save.`);
+  }
   const checked = (own) => ({ ...STARTS, ...Object.fromEntries(
     Object.entries(own).map(([key, value]) => [key, check(key, value)])) });
   return { b: checked(found.b ?? {}), a: found.a ? checked(found.a) : null };

@@ -16,8 +16,9 @@ export async function filmOf(mapsAt, caption, seconds) {
   const frame = (share) => {
     context.fillStyle = "#fff";
     context.fillRect(0, 0, canvas.width, canvas.height);
-    mapsAt(share).forEach((options, k) => drawFrame(context, { x: GAP + k * (SIDE + GAP), y: HEAD, side: SIDE },
-      options));
+    mapsAt(share).forEach((options, k) => {
+      drawFrame(context, { x: GAP + k * (SIDE + GAP), y: HEAD, side: SIDE }, options);
+    });
     context.fillText(caption(share), GAP, HEAD + SIDE + 23);
   };
   frame(0);

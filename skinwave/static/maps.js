@@ -203,8 +203,9 @@ function canvasBelow(svg, options, { x, y, side }) {
   }
   canvas.hidden = !options.moving;
   const n = sideOf(options), cell = side / (n - 1), own = svg.getBoundingClientRect();
-  const around = svg.parentElement.getBoundingClientRect(), within = { left: own.left - around.left + x - cell / 2,
-    top: own.top - around.top + y - cell / 2, width: side + cell, height: side + cell };
+  const around = svg.parentElement.getBoundingClientRect();
+  const within = { left: own.left - around.left + x - cell / 2, top: own.top - around.top + y - cell / 2,
+    width: side + cell, height: side + cell };
   if (canvas.width !== n) [canvas.width, canvas.height] = [n, n];
   for (const [name, length] of Object.entries(within)) canvas.style[name] = `${length}px`;
   canvas.style.clipPath = `inset(${cell / 2}px)`;

@@ -46,7 +46,8 @@ let playing = 0, clock = 0, editing = null, notice = "";
 /** The surface of maps as a flat sheet for pictures of the kernel in three dimensions, in mm. */
 const flatSheet = (() => {
   const n = MAP_LINE.length, points = new Float32Array(3 * n * n), triangles = [];
-  for (let p = 0; p < n * n; p++) points.set([1e3 * MAP_LINE[p % n], 1e3 * MAP_LINE[Math.floor(p / n)], 0], 3 * p);
+  const at = (k) => 1e3 * MAP_LINE[k];
+  for (let p = 0; p < n * n; p++) points.set([at(p % n), at(Math.floor(p / n)), 0], 3 * p);
   for (let p = 0; p < n * (n - 1); p++) {
     if ((p + 1) % n) triangles.push(p, p + 1, p + n, p + 1, p + n + 1, p + n);
   }
@@ -230,7 +231,8 @@ function drawMotion() {
 /** Options of both maps at the time of the clock. */
 function motionMaps() {
   const a = pinned?.maps ? pinned : null;
-  const b = answer, isPlaying = Boolean(playing), top = (name, largest) => scale(`motion ${name}`, largest, moving);
+  const b = answer, isPlaying = Boolean(playing);
+  const top = (name, largest) => scale(`motion ${name}`, largest, moving);
   const common = (own) => ({ path: pathsOf(own.load), point: [own.x, own.y], foci: fociAt(own.load, now()),
     influenced: own.maps.kernel.rms, moving: isPlaying, hatched: own.invalid });
   const topOf = (own) => top(`waves ${own.body.name}`, own.maps.waves.crest);
@@ -274,7 +276,8 @@ function showSolid() {
   if (solidAnswer === answer) return;
   solidAnswer = answer;
   const { body, kernel, waves, load, x, y } = answer, fd = drawingFrequency(load.path);
-  const common = { path: pathsOf(load), points: [[x, y]], foci: fd ? (t) => fociAt(load, t) : [fociAt(load, 0)] };
+  const foci = fd ? (t) => fociAt(load, t) : [fociAt(load, 0)];
+  const common = { path: pathsOf(load), points: [[x, y]], foci };
   solid.show({ ...common, shape: body.shape, motion: { f: waves.f, ...waves.surface() } });
   const { re, im } = kernel.onGrid(MAP_LINE, MAP_LINE), up = (values) => values.map((v) => -v);
   solidKernel.show({ ...common, shape: flatSheet, motion: { f: kernel.f, re: up(re), im: up(im) }, unit: "Pa",

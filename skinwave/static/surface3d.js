@@ -71,7 +71,8 @@ export function strongLines({ f, re, im }) {
   }
   const most = Math.max(0, ...lines.map((line) => line.largest));
   const strong = lines.filter((line) => line.largest > NEGLIGIBLE * most);
-  return { n, lines: strong, largest: lines.map((line) => line.largest), crest: CREST * Math.sqrt(largestOf(squares)) };
+  const largest = lines.map((line) => line.largest), crest = CREST * Math.sqrt(largestOf(squares));
+  return { n, lines: strong, largest, crest };
 }
 
 /** Write the sum of lines at a time in s into `out` (n,). */

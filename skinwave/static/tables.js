@@ -41,8 +41,8 @@ export function tiles(answer, pinned) {
   const onSkin = (text) => (body.is_skin ? text : "not skin, no threshold");
   const details = { level: onSkin(line), reach: onSkin(reach ? "from the path" : ""), share: "",
     delay: "behind the pressure" };
-  const kernel = { level: answer.kernelLevel ? `${signed(answer.kernelLevel.dB)} dB` : "none", reach: distance(answer.kernelReach),
-    share: percent(answer.kernelShare), delay: milliseconds(0) };
+  const kernel = { level: answer.kernelLevel ? `${signed(answer.kernelLevel.dB)} dB` : "none",
+    reach: distance(answer.kernelReach), share: percent(answer.kernelShare), delay: milliseconds(0) };
   return Object.entries(TILES).map(([key, [name, help]]) => `<div class="tile" title="${help}">
     <span class="name">${name}</span><span class="value">${own[key]}</span>
     <span class="kernel">kernel ${kernel[key]}</span><span class="detail">${details[key]}</span>
