@@ -17,7 +17,6 @@ from skinwave.bodies.discretised import THINNEST, Strata
 from skinwave.bodies.parts import solid_of
 
 FINEST_HAND = 1e-3  # m: finer elements of a hand exceed the limits of its mesher
-COARSER = 2.0  # elements of a map over those of the default size
 THICKEST, AT = 0.1, 400.0  # coat over a shear wavelength at Hz, the highest lines of Tactons
 
 
@@ -88,9 +87,9 @@ def default_size(body: Body) -> float:
     return body.of_kind.default_size(body)
 
 
-def map_size(body: Body) -> float:
+def map_size(body: Body, coarser: float = 2.0) -> float:
     """Return the element size of a map, m: it needs less accuracy than probes."""
-    return COARSER * default_size(body)
+    return coarser * default_size(body)
 
 
 def thicknesses(strata: Strata) -> list[float]:

@@ -16,6 +16,7 @@ import fem
 from fem.krylov import EXPANSION_POINT
 from fem.load_and_probe import (
     displacement_operator,
+    facet_geometry,
     facet_normals,
     facet_points,
     probe_operator,
@@ -45,9 +46,6 @@ from skinwave.typing import Floats
 MOST_IMBALANCE = 0.01  # relative error of the energy balance, above which a response is refused
 ON_PLANE = 1e-9  # m, distance up to which a probe is on a plane
 WEAKEST_LINE = 1e-6  # of the strongest line of a load
-# Expansion point times the crossing time: the best one of palms, slabs, a fingertip and a hand is
-# 0.7 to 1.6 times as large. Within these bounds in rad/s, for any body.
-PER_CROSSING, POINTS = 3.8, (2 * np.pi * 50.0, 2 * np.pi * 1000.0)
 
 
 def mesh_body(
@@ -96,11 +94,16 @@ def with_cost(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
     )  # fmt: skip
 
 
-def expansion_point(body: Body, build: Build) -> float:
-    """Return the expansion point in rad/s with which a body's reduced model needs few vectors.
+def expansion_point(
+    body: Body, build: Build, *, per_crossing: float = 3.8,
+    within: tuple[float, float] = (2 * np.pi * 50.0, 2 * np.pi * 1000.0),
+) -> float:  # fmt: skip
+    """Return the expansion point in rad/s, `within` bounds, with which a body's reduced model needs
+    few vectors.
 
     The lowest natural frequency of tissue on bone follows the time in which shear waves cross the
-    mean depth, the volume over the area of the top.
+    mean depth, the volume over the area of the top seen from above. `per_crossing` is the point
+    times this time. The best one of palms, slabs, a fingertip and a hand is 0.7 to 1.6 times it.
     """
     if body.of_kind.is_plate:
         return EXPANSION_POINT
@@ -108,9 +111,8 @@ def expansion_point(body: Body, build: Build) -> float:
     slowness = {region: 1 / solid.shear_speed for region, solid in build.material.items()}
     volumes = corner_volumes(mesh.points, mesh.tets[:, :4])
     crossing = sum(volumes[mesh.region == k].sum() * each for k, each in slowness.items())
-    corners = mesh.points[mesh.facets["top"][:, :3]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    return float(np.clip(PER_CROSSING * np.abs(normals[:, 2]).sum() / crossing, *POINTS))
+    area = np.abs(facet_geometry(mesh, mesh.facets["top"])[1][..., 2]).sum()
+    return float(np.clip(per_crossing * area / crossing, *within))
 
 
 def surface_load(build: Build, load: Load = PRESSURE) -> tuple[sparse.csr_array, Floats]:

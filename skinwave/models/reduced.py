@@ -50,7 +50,7 @@ from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, sil
 from skinwave.typing import Bools, Floats
 
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
-REDUCTION_TOLERANCE, REDUCTION_SHARE = 4e-3, 1 / 15  # at most, and of the waveform's
+REDUCTION_TOLERANCE = 4e-3  # at most
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
 FORMAT = "reduced 13"  # of a cached body
 MANY_OUTPUTS = 24  # from where a body is reduced for one path, whose load has about as many parts
@@ -58,9 +58,9 @@ PATH_SHARE = 3  # of that tolerance: error of the load along a path
 NEGLIGIBLE_LINE_RATIO = 1e-7  # to the strongest line at the probes
 
 
-def reduction_tolerance(tolerance: float) -> float:
+def reduction_tolerance(tolerance: float, share: float = 1 / 15) -> float:
     """Return the tolerance of a reduction, a small share of the waveform's."""
-    return min(REDUCTION_TOLERANCE, REDUCTION_SHARE * tolerance)
+    return min(REDUCTION_TOLERANCE, share * tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

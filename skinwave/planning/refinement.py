@@ -32,7 +32,6 @@ from skinwave.typing import Array, Floats
 APART = 1.6, 2.0
 # Ratio of their cells along an axis; and of successive sizes of a refinement, at least.
 CELLS_APART, STEP = 1.45, 1.3
-STEPS = 12  # sizes that are tried within a factor of 2
 COMPARABLE = 1.25, 1.75  # ratios of cells of meshes that are compared in any case
 LAST_STEP = 1.1  # to the finest mesh, at least
 # Of the default element size: the coarsest mesh of bodies whose elements follow their layers, and
@@ -180,14 +179,16 @@ def nearest_size(sizes: Floats, wanted: float) -> float:
     return float(sizes[np.abs(np.log(sizes / wanted)).argmin()])
 
 
-def element_sizes(body: Body) -> Floats:
-    """Return the sequence of element sizes (k,) in m for a body, descending."""
+def element_sizes(body: Body, steps: int = 12) -> Floats:
+    """Return the sequence of element sizes (k,) in m for a body, descending: those of whole numbers
+    of cell layers, or `steps` within a factor of 2.
+    """
     coarsest, finest = COARSEST * default_size(body), FINEST * default_size(body)
     if not body.of_kind.conforming:  # coarser meshes would cut off the rim and layers
         coarsest = min(COARSEST_HAND * default_size(body), COMPARED * coarsest_size(body))
         finest = max(finest, min(default_size(body), FINE_PALM))
     if not _has_cell_layers(body):
-        sizes = default_size(body) * 2.0 ** (np.arange(-80, 80)[::-1] / STEPS)
+        sizes = default_size(body) * 2.0 ** (np.arange(-80, 80)[::-1] / steps)
         sizes = sizes[(sizes <= coarsest) & (sizes >= finest)]
         if actual := body.of_kind.actual_size:  # one size for each mesh
             return sizes[

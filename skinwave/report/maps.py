@@ -258,7 +258,7 @@ def _snapshot_frames(view: View, count: int) -> list[int]:
     frequency = view.scene.tacton.trajectory.drawing_frequency or view.tone
     turn = min(1 / frequency, view.period) if frequency else view.period
     frames = len(view.times)
-    first, step = int(np.abs(view.inward).max(axis=1).argmax()), frames * turn / view.period / count
+    first, step = view.peak_frame, frames * turn / view.period / count
     return [(first + round(k * step)) % frames for k in range(count)]
 
 

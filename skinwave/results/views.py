@@ -111,6 +111,11 @@ class View:
         """Largest motion into or out of the body, in SI units."""
         return float(np.abs(self.inward).max()) or 1.0
 
+    @property
+    def peak_frame(self) -> int:
+        """Frame at which the body moves most."""
+        return int(np.abs(self.inward).max(axis=1).argmax())
+
 
 def fastest_line(moved: BodyMotion) -> float:
     """Return the highest frequency in Hz that moves a body by `STRONG_LINE_RATIO` or more."""

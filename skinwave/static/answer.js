@@ -67,9 +67,9 @@ function validity({ body, waves, x, y }) {
       invalid: ratio > LARGE_DEFLECTION ? `linear model, ${ratio.toPrecision(2)} × thickness` : "" };
   }
   const stretching = body.stretchingOf(waves);
-  const percent = stretching < 0.5 ? (100 * stretching).toPrecision(2) : "above 50";
-  return { stretching,
-    invalid: stretching > TOLERANCE ? `stretching is left out: error ${percent} %` : "" };
+  // Large errors are known to be large only: resonances that stretching shifts have no bound here.
+  const invalid = stretching > TOLERANCE ? `stretching is left out: error above ${100 * TOLERANCE} %` : "";
+  return { stretching, invalid };
 }
 
 function warnings({ load, body }) {

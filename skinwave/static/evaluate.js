@@ -105,9 +105,17 @@ export function mapOf(motion) {
 /** Largest value of the `rate`-th derivative of a motion at a place within the first `EXAMINED` s. */
 export function peakAt(motion, [x, y], rate = 0) {
   const times = Float64Array.from({ length: EXAMINED / STEP }, (_, k) => k * STEP);
-  let values = motion.waveform(x, y, times);
-  for (let n = 0; n < rate; n++) values = values.map((v, k) => (k ? (v - values[k - 1]) / STEP : 0));
-  return largestOf(values);
+  return largestOf(derivative(motion.waveform(x, y, times), STEP, rate));
+}
+
+/** Derivative (t,) of an order of values (t,) at steps of dt in s. */
+export function derivative(values, dt, order) {
+  if (!order) return values;
+  const last = values.length - 1, lower = derivative(values, dt, order - 1);
+  return lower.map((_, k) => {
+    const [before, after] = [Math.max(k - 1, 0), Math.min(k + 1, last)];
+    return (lower[after] - lower[before]) / (dt * (after - before));
+  });
 }
 
 /** Share 0 to 1 of squared motion where the kernel is 20 dB below its largest; NaN if nothing moves. */

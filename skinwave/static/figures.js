@@ -3,7 +3,7 @@
 import { inQuantity, lineName } from "./answer.js";
 import { drawingFrequency, gainAt, positionOf, relativeIntensity, rhythmLevel,
   rhythmPeriod } from "./load.js";
-import { QUANTITIES, amplitudesOf, meanLevel, spectrum, thresholdAt } from "./evaluate.js";
+import { QUANTITIES, amplitudesOf, derivative, meanLevel, spectrum, thresholdAt } from "./evaluate.js";
 import { largestOf } from "./numeric.js";
 import { niceTop } from "./plots.js";
 import { rounded, signed } from "./text.js";
@@ -33,14 +33,7 @@ export function spanOf(name, load) {
 function waveform(motion, [x, y], [start, end], { per, rate }) {
   const count = Math.max(FEWEST_POINTS, Math.ceil(end / LONGEST_STEP)), dt = end / count;
   const times = Float64Array.from({ length: count + 1 }, (_, k) => k * dt);
-  let values = motion.waveform(x, y, times);
-  for (let n = 0; n < rate; n++) {
-    const own = values;
-    values = own.map((_, k) => {
-      const [before, after] = [Math.max(k - 1, 0), Math.min(k + 1, count)];
-      return (own[after] - own[before]) / (dt * (after - before));
-    });
-  }
+  const values = derivative(motion.waveform(x, y, times), dt, rate);
   const scaled = (own, factor) => Array.from(own.subarray(Math.floor(start / dt)), (v) => factor * v);
   return { x: scaled(times, 1e3), y: scaled(values, per) };
 }

@@ -51,7 +51,7 @@ export function sceneToml(values, record) {
     `[focus]\n${table(focus)}`, record.toml.trim(), `[probes]\n${table(probes)}`].join("\n\n") + "\n";
 }
 
-// Keys of a scene file that are values of a control, and what these are multiplied by.
+// Keys of a scene file whose values are those of a control.
 const KEYS = {
   "tacton.amplitude_percent": "amplitude", "tacton.am_frequency_hz": "am",
   "tacton.second_am_frequency_hz": "am2", "tacton.envelope_frequency_hz": "envelope",

@@ -14,7 +14,6 @@ from itertools import starmap
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image as Pillow
 from PIL import features
@@ -240,8 +239,7 @@ def begin_pictures(
         views = views_of(scenes, moved.result()[0])
         if not (views and renderer().is_available):
             return None
-        frame = moving_most(views[-1])
-        return workers.submit(render.picture, views, REPORT, frame).result()
+        return workers.submit(render.picture, views, REPORT, views[-1].peak_frame).result()
 
     begun = {AT_REST: threads.submit(at_rest), SIDE_BY_SIDE: threads.submit(side_by_side)}
     threads.shutdown(wait=False)
@@ -400,13 +398,8 @@ def _spatial_parts(first: FirstScreen, gallery: Gallery, failures: dict[str, str
     with or_failed(failures, "picture in three dimensions"):
         begun = gallery.begun.get(SIDE_BY_SIDE)
         drawn = begun.result() if begun else None
-        return [side_by_side(first.views, moving_most(own), gallery, drawn)]
+        return [side_by_side(first.views, own.peak_frame, gallery, drawn)]
     return []
-
-
-def moving_most(view: View) -> int:
-    """Return the frame at which a body moves most."""
-    return int(np.abs(view.inward).max(axis=1).argmax())
 
 
 def side_by_side(views: Sequence[View], frame: int, gallery: Gallery, drawn: Any = None) -> Picture:

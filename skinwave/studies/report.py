@@ -117,7 +117,7 @@ def picture_parts(
         return [NO_VIEWS]
     of_scene = [v for v in views if v.scene.body == album.scene.body and v.quantity.of_body]
     own = (of_scene or views)[-1]
-    frame = int(np.abs(own.inward).max(axis=1).argmax())
+    frame = own.peak_frame
     options: dict[str, Any] = {}
     missing: list[Part] = []
     if renderer().is_available:

@@ -256,7 +256,9 @@ def test_a_body_is_drawn_with_its_conditions_and_materials(body, named, material
         assert at_left.any()
         assert (at_left | np.isclose(clamped[:, 2], -1e3 * body.depth)).all()
     elif body.kind == "palm":  # on bone below
-        assert (clamped[:, 2] < -1e3 * body.depth / 4).all()
+        held = middles[(drawn.conditions == "clamped") & (drawn.shares > 0.5)]  # not faded
+        assert len(held)
+        assert (held[:, 2] < -1e3 * body.depth / 3).all()
     else:
         axis = 0 if body.kind == "sheet" else 1
         assert (clamped[:, axis] < -half[axis] + 1e3 * size).all()

@@ -12,7 +12,6 @@ import pytest
 from skinwave import loads
 from skinwave.commands.cli import main
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import REDUCTION_TOLERANCE
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 
@@ -135,9 +134,7 @@ def test_a_silent_tacton_causes_no_motion():
     silent = loads(corpus.GOOD.replace("[tacton]", "[tacton]\namplitude_percent = 0"))
     for model in ("point-kernel", "flat-body", "fem"):
         assert not compute(silent, model, tolerance=0.3, h=0.006).displacement.any()
-    assert (
-        plan(silent, SolveOptions(tolerance=0.3, model="fem", h=0.006)).error < REDUCTION_TOLERANCE
-    )
+    assert plan(silent, SolveOptions(tolerance=0.015, model="fem", h=0.006)).error < 1e-3
 
 
 @pytest.mark.parametrize(
