@@ -24,6 +24,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,7 +60,7 @@ LOAD_END = 6.0  # steepness of the error function that ends a load after the rec
 FEW_DISTANCES = 40  # largest number that is computed without splines
 AT_ONCE = 2**22  # values transformed at a time, about 100 MB
 STEPS_PER_WIDTH = 6  # distances of a spline per standard deviation of the focal spot
-FEWEST_STEPS = 8  # distances of a spline
+SHARED_STEPS = 8  # the steps of a spline are a multiple, so that loads share their integrals
 SAMPLE_OFFSETS = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # without symmetry
 NEGLIGIBLE = 1e-4  # of the largest response, where the frequencies of a transient end
 
@@ -236,8 +237,8 @@ def field_history(
     probes = np.atleast_2d(np.asarray(probes, np.float64))
     within, padded = transform_samples(times)
     dt, n = step(times) / within, (len(times) - 1) * within + 1
-    damping = -np.log(WRAP_AROUND) / (padded * dt)
-    w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
+    w = _transform_frequencies(padded, dt)
+    damping = -w[0].imag
     folded = is_folded(pressure, times)
     if not folded and oversampling(highest_line(pressure), step(times)) > 1:
         passed = below_half_the_rate(w.real / (2 * np.pi), times).astype(float)
@@ -260,7 +261,7 @@ def field_history(
         parts = max(parts, ABRUPT_PARTS if len(jumps) or turns else 1)
         knots, of_load = _sampled_load(pressure, jumps, padded, dt, parts, lasting)
     table, splines = _interpolation(probes, knots, width)
-    g = point_integrals(field, table, w, width, negligible=NEGLIGIBLE)
+    g = _transient(field, tuple(table.tolist()), padded, dt, width)
     u = np.zeros((len(w), len(probes), len(field.weights(SAMPLE_OFFSETS))), np.complex128)
     for i, probe in enumerate(probes):
         weighted = weighted_splines(field, splines, probe - knots)
@@ -273,6 +274,25 @@ def field_history(
     t = dt * np.arange(n)[::within]
     u *= passed[:, None, None]
     return np.fft.irfft(u, padded, axis=0)[:n:within] * np.exp(damping * t[:, None, None])
+
+
+def _transform_frequencies(padded: int, dt: float) -> Complex:
+    """Frequencies (f,) in rad/s of a transform, below the real axis by its damping."""
+    damping = -np.log(WRAP_AROUND) / (padded * dt)
+    return np.asarray(2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping)
+
+
+@lru_cache(maxsize=4)
+def _transient(
+    field: Field, distances: tuple[float, ...], padded: int, dt: float, width: float
+) -> Complex:
+    """Integrals (c, f, r) of a transient. They depend on the body, not on the Tacton, so that all
+    loads of a sweep share them.
+    """
+    w = _transform_frequencies(padded, dt)
+    g = point_integrals(field, np.array(distances), w, width, negligible=NEGLIGIBLE)
+    g.flags.writeable = False
+    return g
 
 
 def transform_samples(times: Floats) -> tuple[int, int]:
@@ -338,7 +358,7 @@ def _width(pressure: MovingPressure) -> float:
 
 def spline_steps(furthest: float) -> int:
     """Number of distances of a spline up to a distance in standard deviations of the focal spot."""
-    return max(FEWEST_STEPS, int(np.ceil(furthest * STEPS_PER_WIDTH)))
+    return SHARED_STEPS * max(1, int(np.ceil(furthest * STEPS_PER_WIDTH / SHARED_STEPS))) + 1
 
 
 def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
@@ -353,6 +373,6 @@ def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats,
 
     furthest = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
     steps = spline_steps(furthest / width)
-    table = np.linspace(0, furthest, steps)
+    table = width / STEPS_PER_WIDTH * np.arange(steps)
     flat = (1, np.zeros(steps))
     return table, CubicSpline(table, np.eye(steps), bc_type=(flat, "not-a-knot"))

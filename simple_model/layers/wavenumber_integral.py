@@ -71,8 +71,9 @@ class _Grid:
     kernels: dict[int, Complex]
 
 
+@lru_cache(maxsize=16)
 def normal_field(compliance: Compliance) -> Field:
-    """Displacement of the surface into the body, m."""
+    """Displacement of the surface into the body, m; the same record for the same body."""
     return Field(
         answer=lambda k, w: compliance(k, w)[None],
         orders=(0,),

@@ -1,5 +1,6 @@
 """Analytic solutions of a body: its stack of layers, wavenumber integral and modes."""
 
+from functools import lru_cache
 from math import inf, isfinite
 
 from simple_model import Stack
@@ -29,8 +30,11 @@ def is_laterally_infinite(body: Body) -> bool:
     return body.sides == "absorbing" or not isfinite(body.depth)
 
 
+@lru_cache(maxsize=16)
 def compliance(body: Body) -> Compliance:
-    """Return the compliance of an infinite body of the same section, with mean moduli."""
+    """Return the compliance of an infinite body of the same section, with mean moduli; the same
+    record for the same body.
+    """
     if body.of_kind.compliance is None:
         raise ValueError(
             "the wavenumber integral supports a sheet or a slab, not a body of kind "

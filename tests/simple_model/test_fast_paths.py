@@ -1,5 +1,6 @@
 """Loads faster than their samples: lines above half the rate, jumps, and ends of records."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from simple_model.layers.compliance import slab
 from simple_model.layers.flat_body import field_history, steady_history, steady_lines
 from simple_model.layers.flat_quantities import surface_field
 from simple_model.layers.material import PRESETS
-from simple_model.layers.wavenumber_integral import point_response
+from simple_model.layers.wavenumber_integral import point_integrals, point_response
 from simple_model.load.focus import spot_width
 from simple_model.load.path_cells import path_fourier, path_samples
 from simple_model.load.sampling import resolving_step
@@ -156,3 +157,18 @@ def test_every_model_returns_the_given_times():
         body = replace(SKIN, sides="absorbing") if "flat" in model else SKIN
         found = compute(Scene(pressure=load, body=body), model, times=times, h=10e-3)
         np.testing.assert_allclose(found.times, times, atol=1e-12)
+
+
+def test_tactons_on_a_body_share_its_integrals(monkeypatch):
+    module, calls = sys.modules["simple_model.layers.flat_body"], []
+    monkeypatch.setattr(module, "point_integrals", lambda *a, **k: calls.append(a[3])
+                        or point_integrals(*a, **k))  # fmt: skip
+    # Longest first: a shorter path has fewer distances, of the same step.
+    found = [
+        flat_body(PALM, circling(0.02, speed, am), PROBES, TIMES[:400]).values
+        for speed, am in ((12.0, 137.0), (7.0, 80.0), (3.3, 45.5))
+    ]
+    assert calls == [spot_width(0.2)]
+    module._transient.cache_clear()
+    alone = flat_body(PALM, circling(0.02, 3.3, 45.5), PROBES, TIMES[:400]).values
+    np.testing.assert_array_equal(found[2], alone)
