@@ -127,17 +127,19 @@ def path_samples(pressure: MovingPressure) -> Floats:
 
 
 def path_fourier(
-    pressure: MovingPressure, values: Floats | Complex, orders: Ints | None = None
+    pressure: MovingPressure, values: Floats | Complex, orders: Ints | None = None, few: int = 16
 ) -> Complex:
     """Fourier coefficients (..., n) of the effect of a load, for given orders (n,) or all.
 
     `values` (..., q) are the effects of a focus of unit pressure at each of `path_samples`. Index
-    -n is harmonic -n.
+    -n is harmonic -n. For fewer positions than `few`, the load is transformed, not the values.
     """
     mixing = path_cells(pressure).cells
     k, shape, rows = mixing.shape[0], values.shape[:-1], values.reshape(-1, values.shape[-1])
     wanted = np.arange(k) if orders is None else orders
     shift = np.exp(-1j * np.pi * np.fft.fftfreq(k)[wanted]) / k
+    if mixing.shape[1] < min(len(rows), few):
+        return np.asarray(values @ (fft.fft(mixing.toarray(), axis=0)[wanted].T * shift))
     blocks = np.array_split(rows, max(1, len(rows) * k // AT_ONCE))
     transformed = [fft.fft((mixing @ block.T).T, axis=-1)[:, wanted] * shift for block in blocks]
     return np.asarray(np.concatenate(transformed).reshape(*shape, len(wanted)))

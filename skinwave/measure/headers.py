@@ -7,7 +7,7 @@ programs and languages are identified by their units and a few words.
 
 import re
 import unicodedata
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from simple_model.quantities import QUANTITIES
 from skinwave.measure.units import (
@@ -18,7 +18,9 @@ from skinwave.measure.units import (
     TIMES,
     canonical,
     metres,
+    per_reference,
     quantity_of,
+    split_level,
 )
 
 TIME, FREQUENCY, X, Y, Z = "time", "frequency", "x", "y", "z"
@@ -55,15 +57,12 @@ COMPLEX_PARTS = {
 _PART = "|".join(COMPLEX_PARTS)
 _HEADING = re.compile(
     r"(?P<name>[^()\[\]#]*?)\s*"
-    r"(?:\((?P<place>[^()]*,[^()]*)\))?\s*(?:\#(?P<repetition>\d{1,9}))?\s*"
+    r"(?:\((?P<place>[^()a-zA-Z]*,[^()]*)\))?\s*(?:\#(?P<repetition>\d{1,9}))?\s*"
     r"(?:\[(?P<unit>[^\]]*)\]|\((?P<round>(?:[^(),]|\([^()]*\))*)\))?"
 )
-_SUFFIXES = {
-    unit.replace("/", "_"): unit
-    for units in (TIMES, FREQUENCIES, *MOTION.values(), ANGLES)
-    for unit in units
-}
-UNITS = {canonical(unit) for unit in _SUFFIXES.values()} | {
+UNITS = {unit for units in (TIMES, FREQUENCIES, *MOTION.values(), ANGLES) for unit in units}
+_SUFFIXES = {unit.replace("/", "_"): unit for unit in UNITS - {"in"}}  # as in "signal_in"
+UNITS |= {canonical(unit) for unit in UNITS} | {
     "V", "mV", "uV", "N", "mN", "Pa", "kPa", "A", "mA", "%", "EU", "a.u.", COUNT_UNIT, "dB", "",
 }  # fmt: skip
 
@@ -91,15 +90,22 @@ class Column:
         """Whether the name or the unit identifies the column as motion."""
         return self.may_be_motion and bool(self.role or self.part or quantity_of(self.unit))
 
+    def with_level(self, level: str) -> "Column":
+        """Return the column with a level in its unit, such as "mm/s RMS", if it may have one."""
+        is_level = self.may_be_motion and self.part != "phase" and not split_level(self.unit)[1]
+        is_level &= bool(quantity_of(per_reference(self.unit)[0]) or not self.unit)
+        return replace(self, unit=f"{self.unit} {level}".strip()) if level and is_level else self
+
 
 def parse_heading(text: str, unit: str = "") -> Column:
     """Return the column with this heading, and with the unit below it, if any."""
     text = " ".join(unicodedata.normalize("NFKC", text).split())
-    heading = text
-    split = re.fullmatch(r"(.+?)(?:\s+/\s*|\s*/\s+|,\s+|\s+in\s+)(\S+)", text)
+    (heading, level), (unit, below) = split_level(text), split_level(unit)
+    split = re.fullmatch(r"(.+?)(?:\s+/\s*|\s*/\s+|,\s+|\s+in\s+)(\S+)", heading)
     if split and canonical(split[2]) in UNITS:
         heading = f"{split[1]} [{split[2]}]"
-    match = _HEADING.fullmatch(heading)
+    match = _HEADING.fullmatch(heading)  # or without words such as "H1(palm,shaker)"
+    match = match or _HEADING.fullmatch(re.sub(r"\([^()]*\)", "", heading, count=1))
     if not match:
         last = re.fullmatch(r".*[\[(]([^\[\]()]*)[\])]", heading)
         unit = (unit or (last[1] if last else "")).strip("[]() ")
@@ -112,14 +118,15 @@ def parse_heading(text: str, unit: str = "") -> Column:
     name, part = words, ""
     if parts:
         name, part = parts[2], COMPLEX_PARTS.get(parts[1] or parts[3] or "", "")
-    return Column(
-        text=heading,
+    column = Column(
+        text=text if level else heading,
         role=ROLES.get(name, "") if match["place"] else _role(name, unit),
         part=part or ("phase" if canonical(unit) in ANGLES else ""),
         place=_place(match["place"]) if match["place"] else Column.place,
         repetition=int(match["repetition"] or 1),
         unit=unit,
     )
+    return column.with_level(level or below)
 
 
 def _role(name: str, unit: str) -> str:

@@ -1,23 +1,25 @@
 """LabVIEW measurement files (.lvm) by lvm-read, and TDMS files by npTDMS."""
 
 import warnings
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from meshes import reading
-from skinwave.measure.headers import parse_heading
+from skinwave.measure.headers import Column, parse_heading
 from skinwave.measure.recording import Given, Recording
-from skinwave.measure.table import Table, recording_of
+from skinwave.measure.table import Table, choose_columns, recording_of
 from skinwave.measure.units import canonical
 
 LARGEST = 1_000_000_000  # bytes
 AXIS_UNITS = {"Time": "s", "Frequency": "Hz"}
 
 
-def lvm_table(text: str) -> Table:
-    """Return the table in the text of a LabVIEW measurement file with one segment."""
+def read_lvm(text: str, given: Given) -> Recording:
+    """Return the recording in the text of a LabVIEW measurement file with one segment."""
     import lvm_read
 
     try:
@@ -31,35 +33,58 @@ def lvm_table(text: str) -> Table:
     if names and names[-1] == "Comment":
         names, numbers = names[:-1], numbers[:, : len(names) - 1]
     units = [unit.strip() for unit in segment.get("Y_Unit_Label", [])]
-    if x_columns == "Multi":
-        pairs = range(0, len(names) - 1, 2)
-        if any(not np.array_equal(numbers[:, k], numbers[:, 0]) for k in pairs):
-            raise ValueError("channels differ in their times; export them with one X column")
-        kept = [0, *(k + 1 for k in pairs)]
-        names, numbers, units = [names[k] for k in kept], numbers[:, kept], units[::2]
-    notes: tuple[tuple[str, str], ...] = ()
-    headings = []
-    if x_columns == "No":
-        step, start = (_common(segment, key) for key in ("Delta_X", "X0"))
-        notes = (("delta_x", repr(step)), ("x0", repr(start)))
-    else:
-        axis = (segment.get("X_Dimension") or ["Time"])[0].strip() or "Time"
-        headings, names = [f"{axis} [{AXIS_UNITS.get(axis, axis)}]"], names[1:]
-    for name, unit in zip(names, [*units, *[""] * len(names)], strict=False):
-        headings.append(f"{name} [{unit}]" if unit else name)
-    return Table(columns=tuple(map(parse_heading, headings)), numbers=numbers, notes=notes)
+    axis = (segment.get("X_Dimension") or ["Time"])[0].strip() or "Time"
+    at = {"No": (), "Multi": range(0, len(names) - 1, 2)}.get(x_columns, (0,))  # columns of times
+    units = [*units[::2], ""] if x_columns == "Multi" else [*units, *[""] * len(names)]
+    of_motion = iter(units)
+    headings = [f"{axis} [{AXIS_UNITS.get(axis, axis)}]" if k in at
+                else f"{name} [{next(of_motion, '')}]" for k, name in enumerate(names)]  # fmt: skip
+    columns = tuple(parse_heading(heading.removesuffix(" []")) for heading in headings)
+    if x_columns != "No":
+        return recording_of(Table(columns=columns, numbers=numbers), given)
+    clocks = map(_clock, segment["Delta_X"], segment["X0"])
+    return _simultaneous([*zip(columns, numbers.T, clocks, [{}] * len(names), strict=False)], given)
 
 
-def _common(segment: dict[str, Any], key: str) -> float:
-    """Return the number that all channels of a segment share."""
-    values = np.asarray(segment[key], float)
-    if not np.allclose(values[np.isfinite(values)], values[0], rtol=1e-9, atol=0):
-        raise ValueError(f"channels differ in {key}; export one of them")
-    return float(values[0])
+Channel = tuple[Column, np.ndarray, tuple[str, ...], Mapping[str, Any]]
+
+
+def _clock(step: float, start: float, begun: object = "") -> tuple[str, ...]:
+    """Return step and start in s, and a date, without round-off; nothing without a step."""
+    return (f"{step:.12g}", f"{start:.12g}", str(begun)) if step else ()
+
+
+def _simultaneous(channels: list[Channel], given: Given) -> Recording:
+    """Return the recording in channels: column, numbers, clock, and properties.
+
+    Channels whose step, start or length differ from those of the chosen ones are left out.
+    """
+    chosen = choose_columns([column for column, *_ in channels], given.columns)
+    clocks = [clock for _, _, clock, _ in channels]
+    of_motion = chosen or range(len(channels))
+    lengths = {len(channels[k][1]) for k in of_motion}
+    wanted = {clocks[k] for k in of_motion} - {()}
+    if len(lengths) > 1 or len(wanted) > 1:
+        each = ", ".join(f"{column.text[:20]} {len(x):,}" for column, x, *_ in channels)
+        raise ValueError(
+            f"channels differ in length, step or start ({each[:120]}); choose simultaneous ones with "
+            "--columns"
+        )
+    kept = [k for k, clock in enumerate(clocks) if len(channels[k][1]) in lengths
+            and (not clock or not wanted or clock in wanted)]  # fmt: skip
+    columns, series, _, properties = zip(*(channels[k] for k in kept), strict=True)
+    clock = next(iter(wanted or {clocks[k] for k in kept}), ())
+    notes = [*zip(("dt", "x0"), clock, strict=False)]
+    notes += [(name, str(value)) for k, own in zip(kept, properties, strict=True)
+              if k in of_motion for name, value in own.items()]  # fmt: skip
+    numbers = np.column_stack(series).astype(float)
+    table = Table(columns=columns, numbers=numbers, notes=tuple(notes))
+    numbers_of = tuple(str(1 + kept.index(k)) for k in chosen)
+    return recording_of(table, replace(given, columns=numbers_of))
 
 
 def read_tdms(path: Path, given: Given) -> Recording:
-    """Return the recording in a TDMS file whose channels share start, step and length."""
+    """Return the recording in a TDMS file, of channels with the same start, step and length."""
     try:
         from nptdms import TdmsFile
     except ImportError:
@@ -75,29 +100,21 @@ def read_tdms(path: Path, given: Given) -> Recording:
             data = [np.asarray(channel[:]) for channel in channels]
     except Exception:  # whatever the library raises for damaged bytes
         raise ValueError("the file is damaged or not a TDMS file; export it again") from None
-    signals = [
-        (channel.name, channel.properties, values)
-        for channel, values in zip(channels, data, strict=True)
-        if values.dtype.kind in "fiuM" and values.size > 1
-    ]
-    if not signals:
-        raise ValueError("no channel of the TDMS file has numbers; save the signals as numbers")
-    if len({len(values) for _, _, values in signals}) > 1:
-        counts = ", ".join(f"{name[:20]} {len(values):,}" for name, _, values in signals)
-        raise ValueError(f"channels differ in length ({counts[:120]}); export those of one rate")
-    columns, series, clocks = [], [], set()
-    for name, properties, values in signals:
-        unit = canonical(str(properties.get("unit_string", "")))
+    names = [channel.name for channel in channels]
+    signals: list[Channel] = []
+    for channel, values in zip(channels, data, strict=True):
+        if values.dtype.kind not in "fiuM" or values.size < 2:
+            continue
+        own, name = channel.properties, channel.name
+        unit = canonical(str(own.get("unit_string", "")))
         if values.dtype.kind == "M":
             values, unit = (values - values[0]) / np.timedelta64(1, "s"), "s"
-        columns.append(parse_heading(f"{name} [{unit}]" if unit else name))
-        series.append(values)
-        if step := float(properties.get("wf_increment", 0)):
-            start = float(properties.get("wf_start_offset", 0))
-            clocks.add((step, start, properties.get("wf_start_time")))
-    if len(clocks) > 1:
-        raise ValueError("channels differ in step or start; export simultaneous ones")
-    notes = [(("dt", repr(step)), ("x0", repr(start))) for step, start, _ in clocks]
-    numbers = np.column_stack(series).astype(float)
-    table = Table(columns=tuple(columns), numbers=numbers, notes=notes[0] if notes else ())
-    return recording_of(table, given)
+        name = f"{channel.group_name}/{name}" if names.count(name) > 1 else name
+        column = parse_heading(f"{name} [{unit}]" if unit else name)
+        clock = _clock(own.get("wf_increment", 0), own.get("wf_start_offset", 0),
+                       own.get("wf_start_time", ""))  # fmt: skip
+        given_by = {key: x for key, x in own.items() if not key.startswith("NI_")}
+        signals.append((column, values, clock, given_by))
+    if not signals:
+        raise ValueError("no channel of the TDMS file has numbers; save the signals as numbers")
+    return _simultaneous(signals, given)

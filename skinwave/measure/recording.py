@@ -1,5 +1,7 @@
 """Completion of a file's recording: SI units, positive into the body, even times, no gaps."""
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -9,8 +11,14 @@ from simple_model.choices import choose
 from simple_model.quantities import QUANTITIES
 from skinwave.measure import units
 from skinwave.measure.measurement import UNEVEN, Measurement
+from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
+FACTOR = re.compile(
+    r"(^|[ _.\[-])(scal(e|ing)|skalierung|factor|faktor|calib(ration)?|cal|sensitivity|"
+    r"empfindlichkeit|gain|lsb|slope|resolution|units?_?per_?\w+|per_(count|bit|lsb))($|[ _.(\[-])",
+    re.IGNORECASE,
+)  # names of numbers that scale counts
 LARGEST_VALUE = 1e100  # in SI; squares of larger values may overflow
 LOWEST_RATE = 40.0  # Hz; half of it is below all vibrations that are felt
 EXAMPLE = "--quantity velocity --unit mm/s"
@@ -70,6 +78,7 @@ class Recording:
     drive: np.ndarray = field(default_factory=lambda: np.empty(0))  # (t,) or (f,)
     sign: int = 0  # 1 into the body, -1 out of it, 0 unknown
     name: str = ""
+    factors: Mapping[str, float] = field(default_factory=dict)  # that may not be applied
     remarks: tuple[str, ...] = ()
 
 
@@ -81,12 +90,15 @@ def unknown_places(count: int) -> Floats:
 def complete(recording: Recording, given: Given, path: Path) -> Measurement:
     """Return the measurement in SI, positive into the body."""
     remarks = list(recording.remarks)
+    factor = _amplitude(recording, given, remarks)
     quantity, unit = _quantity(recording, given)
+    _check_counts(recording, given, unit, remarks)
     recording = replace(recording, places=_places(recording, given))
     recording = _without_empty(recording, remarks)
     times, recording = _sample_evenly(recording, given, remarks)
     sign = given.sign or recording.sign
-    values = units.in_si(recording.values, units.motion_divisor(unit, quantity)) * (sign or 1)
+    values = units.in_si(recording.values, units.motion_divisor(unit, quantity))
+    values = values * ((sign or 1) * factor)
     if values.size and not np.abs(values).max() < LARGEST_VALUE:
         raise ValueError(f"values reach {np.abs(values).max():g} in SI; check them and --unit")
     if missing := int(np.isnan(recording.places).any(axis=1).sum()):
@@ -106,9 +118,47 @@ def complete(recording: Recording, given: Given, path: Path) -> Measurement:
     )  # fmt: skip
 
 
+def _amplitude(recording: Recording, given: Given, remarks: list[str]) -> float:
+    """Return the amplitude of values whose level, such as RMS, is 1."""
+    units.check_linear(recording.unit)
+    level = units.split_level(given.unit)[1] or units.split_level(recording.unit)[1]
+    if recording.frequencies.size:
+        if (factor := units.AMPLITUDES[level]) != 1:
+            remarks.append(f"{level} values are multiplied by {factor:.4g}, which gives amplitudes")
+        return factor
+    is_level = np.isrealobj(recording.values) and np.nanmin(recording.values, initial=0.0) >= 0
+    if level in (units.RMS, units.PEAK_TO_PEAK) or (level and is_level and not given.unit):
+        raise ValueError(
+            f"{level} values over time are a level, not a waveform. Export the waveform; if this is "
+            'one, give --unit "mm/s peak" or another unit'
+        )
+    return 1.0
+
+
+def _check_counts(recording: Recording, given: Given, unit: str, remarks: list[str]) -> None:
+    """Raise a ValueError for counts beside a factor that is not applied; note it for others."""
+    if re.match(r"[+-]?[\d.]", given.unit.strip()):
+        return
+    for name, factor in recording.factors.items():
+        text = f"'{name[:40]}' = {factor:g}"
+        values = recording.values[~np.isnan(recording.values)]
+        if (values == np.rint(values.real)).all():
+            raise ValueError(
+                f"values are whole numbers, and {text} seems to be their factor; give the motion that "
+                f'1 stands for, such as --unit "{factor:g} {unit}"'
+            )
+        remarks.append(f"{text} is not applied; if values lack it, give a --unit that contains it")
+
+
+def factors_in(texts: Mapping[str, object]) -> dict[str, float]:
+    """Return the numbers other than 1 whose names say that they scale values."""
+    found = {name: number_in(str(value)) for name, value in texts.items() if FACTOR.search(name)}
+    return {name: x for name, x in found.items() if x not in (None, 0.0, 1.0)}
+
+
 def _quantity(recording: Recording, given: Given) -> tuple[str, str]:
     """Return quantity and unit."""
-    unit = given.unit or recording.unit
+    unit = given.unit or units.split_level(recording.unit)[0]
     by_unit = units.quantity_of(unit)
     quantity = given.quantity or (given.unit and by_unit) or recording.quantity or by_unit
     if not unit:

@@ -5,21 +5,35 @@ from the numbers, with a remark.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skinwave.measure.headers import DRIVE, FREQUENCY, INDEX, REPETITION, TIME, Column, X, Y, Z
-from skinwave.measure.recording import Given, Recording
+from skinwave.measure.headers import (
+    DRIVE,
+    FREQUENCY,
+    INDEX,
+    REPETITION,
+    TIME,
+    Column,
+    X,
+    Y,
+    Z,
+    parse_heading,
+)
+from skinwave.measure.recording import Given, Recording, factors_in
 from skinwave.measure.units import (
     FREQUENCIES,
     LENGTHS,
     TIMES,
     canonical,
+    check_linear,
     divisor,
     in_si,
     per_reference,
     quantity_of,
+    split_level,
 )
 from skinwave.typing import Floats
 
@@ -39,6 +53,9 @@ _BAND = re.compile(r"(band[ _-]*|cent(er|re)[ _-]*)?(frequency|frequenz|fréquen
 _AXIS_UNIT = re.compile(r"(horizontal|x|time)[ _-]*units?")
 _UNIT = re.compile(r"(vertical|y)?[ _-]*(units?|einheit)")
 _DIRECTION = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
+_SIGNED = re.compile(r"([-+])([xyz])(?![a-z])|(?<![a-z])([xyz])([-+])(?!\w)", re.IGNORECASE)
+# Notes that tell what amplitudes are; averages of a spectrum do not.
+_SCALING = re.compile(r"(?!.*(averag|mittel)).*(scal|skal|signal|amplitud|magnitud|spe[ck]t|type|detect)")
 Notes = list[tuple[str, str]]
 
 
@@ -106,11 +123,29 @@ def recording_of(table: Table, given: Given) -> Recording:
         values, places = _by_repetition(series)
     notes = {key: value for key, value in reversed(table.notes) if value}
     remarks = [value for key, value in table.notes if key == "remark" and value] + remarks
+    sign = SIGNS.get(notes.get("positive", ""), 0) or _sign([columns[k] for k in motion], given)
     return Recording(
         values=values, times=times, frequencies=frequencies, quantity=quantity, unit=unit,
-        places=places, drive=drive, sign=SIGNS.get(notes.get("positive", ""), 0),
-        name=notes.get("name", ""), remarks=tuple(remarks),
+        places=places, drive=drive, sign=sign, name=notes.get("name", ""),
+        factors=factors_in(notes), remarks=tuple(remarks),
     )  # fmt: skip
+
+
+def _sign(columns: list[Column], given: Given) -> int:
+    """Return the sign of responses whose headings name two signed axes, such as "+Z/Force-Z".
+
+    A force and a motion into the body are alike, so that it is the product of both signs. Returns 0
+    if no heading names both.
+    """
+    named = [_SIGNED.findall(column.text) for column in columns]
+    pairs = {tuple((a + d, (b + c).lower()) for a, b, c, d in each) for each in named}
+    both = {(pair[0][0] == pair[1][0], pair[0][1] == pair[1][1]) for pair in pairs if len(pair) == 2}
+    if both and both not in ({(True, True)}, {(False, True)}) and not given.sign:
+        raise ValueError(
+            "motion and excitation differ in axis, or their signs from column to column; choose "
+            "others with --columns, or give --positive"
+        )
+    return (1 if (True, True) in both else -1) if both else 0
 
 
 def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
@@ -120,6 +155,13 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
     if any(per_reference(column.unit)[1] for column in table.columns):
         remarks.append("values are per unit of the reference")
     roles = {column.role for column in columns}
+    for key, value in table.notes if FREQUENCY in roles else ():
+        level = split_level(f"{key} {value}")[1]
+        if level and (not value or _SCALING.fullmatch(key)):
+            columns = [column.with_level(level) for column in columns]
+        elif level and not parse_heading(key).role:  # not the line of headings
+            remarks.append(f"the file says '{key[:40]}: {value[:40]}'; values are taken as amplitudes "
+                           f'unless their unit is given as, for example, --unit "mm/s {level}"')  # fmt: skip
     has_axis = bool(roles & {TIME, FREQUENCY})
     has_lengths = any(canonical(column.unit) in LENGTHS for column in columns)
     has_places = {X, Y} <= roles and (has_axis or has_lengths)
@@ -128,7 +170,7 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
         is_other = column.role in (X, Y, Z) and not is_length
         if is_other or (column.role == INDEX and not _counts(numbers[:, k])):
             columns[k] = replace(column, role="")
-    chosen = _choose_columns(columns, given.columns)
+    chosen = choose_columns(columns, given.columns)
     directions = [_DIRECTION.search(c.text.lower()) for c in columns if quantity_of(c.unit)]
     axes = sorted({match[1] for match in directions if match})
     if len(axes) > 1 and not (chosen or has_places):
@@ -141,7 +183,7 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
             columns[k] = replace(column, role=INDEX if counts else TIME)
         kind = "a count of samples" if counts else "motion" if has_axis else "time"
         remarks.append(f"column {k + 1} rises evenly and is taken as {kind}")
-    columns = _one_time(columns, numbers)
+    columns = _one_time(columns, numbers, chosen)
     kept = [k for k, column in enumerate(columns) if k in chosen or not column.may_be_motion]
     if not chosen:
         kept = _motion(columns, given, remarks)
@@ -151,8 +193,17 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
             columns[k] = replace(column, unit=axis_unit)
         elif not column.unit and column.may_be_motion and quantity_of(unit):
             columns[k] = replace(column, unit=unit)
-    kept_columns = tuple(columns[k] for k in kept)
-    return replace(table, columns=kept_columns, numbers=numbers[:, kept]), remarks
+    numbers = numbers[:, kept]
+    columns = [columns[k] for k in kept]
+    for k, column in enumerate(columns):
+        if np.isinf(numbers[:, k]).any():
+            row = int(np.isinf(numbers[:, k]).argmax()) + 1
+            raise ValueError(
+                f"row {row} of '{column.text or k + 1}' is an overload; measure with a larger range"
+            )
+    if has_axis and chosen:  # tests beside each other may differ in length
+        numbers = numbers[~np.isnan(numbers).all(axis=1)]
+    return replace(table, columns=tuple(columns), numbers=numbers), remarks
 
 
 def _rows(table: Table) -> Floats:
@@ -178,24 +229,30 @@ def rises(numbers: Floats) -> bool:
     return span > 0 and bool(is_even or rises_always)
 
 
-def _one_time(columns: list[Column], numbers: Floats) -> list[Column]:
-    """Return columns with a single one of times; constants, such as dates, are dropped."""
-    times = [k for k, column in enumerate(columns) if column.role == TIME]
+def _one_time(columns: list[Column], numbers: Floats, chosen: list[int]) -> list[Column]:
+    """Return columns with a single one of times: that to the left of the chosen motion, if any.
+    Constants, such as dates, are dropped.
+    """
+    times = [k for k, column in enumerate(columns) if column.role in (TIME, FREQUENCY)]
     if len(times) < 2:
         return columns
     varying = [k for k in times if len(numbers) == 1 or np.ptp(numbers[:, k])] or times[:1]
-    first, *others = [k for k in varying if columns[k].unit] or varying
+    varying = [k for k in varying if columns[k].unit] or varying
+    leads = not any(column.may_be_motion for column in columns[: varying[0]])
+    own = {max((k for k in varying if k < at), default=varying[0]) if leads
+           else min((k for k in varying if k > at), default=varying[-1]) for at in chosen}  # fmt: skip
+    first, *others = sorted(own) or varying
     for k in others:
-        if not np.array_equal(numbers[:, k], numbers[:, first]):
+        if not np.array_equal(numbers[:, k], numbers[:, first], equal_nan=True):
             names = f"'{columns[first].text}' and '{columns[k].text}'"
-            raise ValueError(f"the columns of times {names} differ; export one of them")
+            raise ValueError(f"the columns {names} differ; choose motion with --columns")
     return [
         replace(column, role=INDEX) if k in times and k != first else column
         for k, column in enumerate(columns)
     ]
 
 
-def _choose_columns(columns: list[Column], wanted: tuple[str, ...]) -> list[int]:
+def choose_columns(columns: Sequence[Column], wanted: tuple[str, ...]) -> list[int]:
     """Return indices of columns that a user names by heading or number, from 1."""
     chosen = []
     for name in wanted:
@@ -276,12 +333,18 @@ Series = list[tuple[Column, np.ndarray]]
 def _series(table: Table, motion: list[int], is_complex: bool) -> Series:
     """Return columns of motion with their values, two columns for each complex amplitude."""
     columns = table.columns
+    for k in motion:
+        check_linear(columns[k].unit, columns[k].text)
     if not is_complex:
         if parts := [columns[k].text for k in motion if columns[k].part]:
             raise ValueError(f"the column '{parts[0]}' is of a spectrum; add the column 'f [Hz]'")
         return [(columns[k], table.numbers[:, k]) for k in motion]
     if len(motion) % 2:
-        raise ValueError("give two columns per place for a spectrum: re and im, or abs and phase")
+        names = ", ".join(columns[k].text or str(k + 1) for k in motion)[:80]
+        raise ValueError(
+            f"a spectrum needs two columns per place, re and im, or abs and phase, not {names}; "
+            "choose with --columns"
+        )
     pairs = zip(motion[::2], motion[1::2], strict=True)
     return [(columns[k], _complex(table, k, other)) for k, other in pairs]
 

@@ -18,10 +18,10 @@ import numpy as np
 
 from meshes.reading import read_exported_text
 from skinwave.measure.headers import TIME, UNITS, Column, X, Y, parse_heading
-from skinwave.measure.labview import lvm_table
+from skinwave.measure.labview import read_lvm
 from skinwave.measure.recording import Given, Recording
 from skinwave.measure.table import EXAMPLE, Notes, Table, coordinates, recording_of
-from skinwave.measure.units import canonical, quantity_of
+from skinwave.measure.units import canonical, quantity_of, split_level
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
@@ -41,8 +41,8 @@ _LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
 def read(path: Path, given: Given) -> Recording:
     """Return the recording in a text file. Raises a ValueError if it has no table of motion."""
     text = read_exported_text(path, LARGEST)
-    table = lvm_table(text) if text.startswith(LVM_FIRST_LINE) else parse_table(text)
-    return recording_of(table, given)
+    is_lvm = text.startswith(LVM_FIRST_LINE)
+    return read_lvm(text, given) if is_lvm else recording_of(parse_table(text), given)
 
 
 def read_places(path: Path) -> Floats:
@@ -94,6 +94,7 @@ def parse_table(text: str) -> Table:
             problems.append(str(error))
             continue
         row = layout.cells(lines[first])
+        layout = _with_shorter(layout, lines[first : first + SAMPLE_ROWS], names)
         columns = _columns(names, units, layout, row, notes)
         numbers = _numbers(lines, first, layout, names, notes)
         for k, cell in enumerate(row[c] for c in layout.numeric):
@@ -130,6 +131,14 @@ def _layouts(rows: list[str]) -> Iterator[_Layout]:
         is_table = any(_is_number(cells[k]) for cells in alike for k in numeric)
         if is_table and (delimiter != " " or numeric == full):
             yield _Layout(delimiter, has_commas, tuple(numeric), width)
+
+
+def _with_shorter(layout: _Layout, rows: list[str], names: list[str]) -> _Layout:
+    """Return the layout with named columns of numbers that end before the others."""
+    cells = [layout.cells(line) for line in rows]
+    more = [k for k, name in enumerate(names) if name and k not in layout.numeric
+            and 2 * sum(k < len(row) and _is_number(row[k]) for row in cells) > len(rows)]  # fmt: skip
+    return replace(layout, numeric=tuple(sorted((*layout.numeric, *more))))
 
 
 def _cells(line: str, delimiter: str, has_commas: bool = False) -> list[str]:
@@ -249,7 +258,7 @@ def _heading_cells(line: str, delimiter: str) -> list[str]:
 
 def _are_units(cells: list[str]) -> bool:
     return any(cells) and all(
-        canonical(cell) in UNITS or re.fullmatch(r"[\[(].*[\])]", cell) is not None
+        canonical(split_level(cell)[0]) in UNITS or re.fullmatch(r"[\[(].*[\])]", cell) is not None
         for cell in cells
     )
 
@@ -276,7 +285,7 @@ def _numbers(
                 io.StringIO(text.replace(",", ".") if layout.has_commas else text),
                 ndmin=2, comments=None, delimiter=None if delimiter == " " else delimiter,
             )  # fmt: skip
-            if table.shape[1] == width and not np.isinf(table).any():
+            if table.shape[1] == width:
                 return table
     return np.array([
         _row(line, k, layout, names, notes)
@@ -301,8 +310,6 @@ def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes
         value = _value(cell)
         if value is None:
             raise refuse(cell, "is not a number; correct it")
-        if np.isinf(value):
-            raise refuse(cell, "is an overload; measure with a larger range")
         values.append(value)
     others = [k for k, cell in enumerate(cells) if cell and k not in layout.numeric]
     for k in others:

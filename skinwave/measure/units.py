@@ -12,7 +12,10 @@ from simple_model.choices import suggestion
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, QUANTITIES, VELOCITY
 
 STANDARD_GRAVITY = 9.80665  # m/s2
-LENGTHS = {"m": 1.0, "cm": 1e2, "mm": 1e3, "um": 1e6, "nm": 1e9, "pm": 1e12}
+LENGTHS = {
+    "m": 1.0, "cm": 1e2, "mm": 1e3, "um": 1e6, "nm": 1e9, "pm": 1e12,
+    "in": 1e4 / 254, "uin": 1e10 / 254, "ft": 1e4 / 3048, "mil": 1e7 / 254,
+}  # fmt: skip
 TIMES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 FREQUENCIES = {"Hz": 1.0, "kHz": 1e-3}
 MOTION = {
@@ -23,6 +26,7 @@ MOTION = {
         "g": 1 / STANDARD_GRAVITY, "mg": 1e3 / STANDARD_GRAVITY,
     },
 }  # fmt: skip
+REFERENCES = ("N", "mN", "kN", "V", "mV", "Pa", "kPa", "A", "mA")
 ANGLES = {"deg": 1.0, "rad": 1.0}
 _LETTERS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "°": "deg", "º": "deg"})
 # Spelled-out units of programs and languages, in lower case.
@@ -34,19 +38,59 @@ _SPELLINGS = {
         "ns": "nsec nanosecond nanoseconds", "Hz": "hz hertz", "kHz": "khz kilohertz",
         "deg": "deg degree degrees grad degdeg", "rad": "rad radian radians",
         "um": "micron microns micrometer micrometre", "V": "v volt volts", "N": "newton newtons",
-        "g": "gn",
+        "g": "g gn g's", "in": "inch inches zoll", "ft": "foot feet", "mil": "mils thou", "in/s": "ips",
     }.items()
     for word in words.split()
 }  # fmt: skip
 _FACTOR = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(.*)", re.IGNORECASE)
-_LEVEL = re.compile(r"dB\w*(/.*)?", re.IGNORECASE)
+_DECIBEL = re.compile(r"\s*dB.*|.*\(dB\)", re.IGNORECASE)
+_POWER_WORD = re.compile(r"\b[paec]sd\b|power|density|leistung|dichte|autospe", re.IGNORECASE)
+_POWER_UNIT = re.compile(r"hz|m\^?[24]/s|[mg)]\^?[24]$", re.IGNORECASE)
+RMS, PEAK_TO_PEAK, PEAK = "RMS", "peak-to-peak", "peak"
+AMPLITUDES = {RMS: 2**0.5, PEAK_TO_PEAK: 0.5, PEAK: 1.0, "": 1.0}  # of a sinusoid of level 1
+_TOP = r"(?:p(?:ea)?k?|spitzen?|cr[êe]te)"
+_WORDS = {
+    PEAK_TO_PEAK: rf"{_TOP}[ _-]*(?:to|zu|bis|à|2)?[ _-]*{_TOP}|spitze[ -]*tal|double amplitude|"
+    "doppelamplitude|schwing(?:breite|weite)",
+    RMS: r"r\.?m\.?s\.?|root[ -]mean[ -]squared?|eff(?:ektiv|icace)?",
+    PEAK: r"(?:0|zero|null)[ _-]*(?:to[ _-]*)?p(?:ea)?k?|p(?:ea)?k|scheitel|spitzen?",
+}
+_LEVELS = re.compile(
+    rf"[ _,]*[(\[]?(?<![a-z]{{2}})(?:{'|'.join(f'({words})' for words in _WORDS.values())})"
+    r"(?:wert|[ _-]value|[ _-]amplitude)?(?![a-z])\.?[)\]]?", re.IGNORECASE,
+)  # fmt: skip
+
+
+def split_level(text: str) -> tuple[str, str]:
+    """Return a unit or heading without a level in it, and the level: one of `AMPLITUDES`.
+
+    >>> split_level("um pk-pk"), split_level("v_rms [mm/s]"), split_level("mm/s")
+    (('um', 'peak-to-peak'), ('v [mm/s]', 'RMS'), ('mm/s', ''))
+    """
+    found = next((match for match in _LEVELS.finditer(text) if match[match.lastindex or 0]), None)
+    if not found:
+        return text, ""
+    level = tuple(_WORDS)[(found.lastindex or 1) - 1]
+    return f"{text[: found.start()]}{text[found.end() :]}".strip(" _-"), level
+
+
+def check_linear(unit: str, text: str = "") -> None:
+    """Raise a ValueError for a unit or heading of a level in dB, or of a power density."""
+    for one in (unit, text):
+        if _DECIBEL.match(one):
+            raise ValueError(f"'{one[:40]}' is a level in dB, not a unit; export linear values")
+    if _POWER_UNIT.search(canonical(unit)) or _POWER_WORD.search(text):
+        raise ValueError(
+            f"'{(text or unit)[:40]}' is a power or a density and has no phase; export waveforms or "
+            "complex amplitudes"
+        )
 
 
 def canonical(unit: str) -> str:
     """Return the canonical spelling of a unit: "um/s" for "µm·s^-1", "m/s2" for "m/s/s"."""
     text = unit.strip().strip("[]()").translate(_LETTERS).replace("**", "^").replace("^", "")
     text = re.sub(r"[\s·*.]*s-1$", "/s", text)
-    text = re.sub(r"[\s·*.]*s-2$|/s/s$|/s\^?2$|/\(s2\)$", "/s2", text).replace(" ", "")
+    text = re.sub(r"[\s·*.]*s-2$|/s(ec)?/s(ec)?$|/s\^?2$|/\(s2\)$", "/s2", text).replace(" ", "")
     above, slash, below = text.partition("/")
     below = re.sub(r"^sec(ond)?s?(?=2?$)", "s", below)
     return _SPELLINGS.get(above.lower(), above) + slash + below
@@ -56,8 +100,9 @@ def per_reference(unit: str) -> tuple[str, bool]:
     """Return the unit of motion in a unit such as "(m/s)/N", and whether there is a reference."""
     unit = re.sub(r"\(1/(\w+)\)\*(\(.*\))", r"\2/\1", unit)
     above, _, below = unit.strip("[] ").rpartition("/")
-    if canonical(below) in ("N", "V", "Pa") and quantity_of(above):
-        return above.strip("() "), True
+    (above, level), (below, other) = split_level(above), split_level(below)
+    if canonical(below) in REFERENCES and quantity_of(above):
+        return f"{above.strip('() ')} {level if level != other else ''}".strip(), True
     return unit, False
 
 
@@ -72,9 +117,8 @@ def motion_divisor(unit: str, quantity: str) -> float:
 
     Raises a ValueError if the unit is unknown, a level in dB, or a unit of another quantity.
     """
+    check_linear(unit)
     factor, name = _factor_and_name(unit)
-    if _LEVEL.fullmatch(name):
-        raise ValueError(f"'{unit}' is a level, not a unit; export linear values")
     units = MOTION.get(quantity, {canonical(QUANTITIES[quantity].unit): 1.0})
     if name not in units:
         other = quantity_of(unit)
@@ -108,7 +152,8 @@ def metres(text: str, unit: str) -> float:
 
 
 def _factor_and_name(unit: str) -> tuple[float, str]:
-    match = _FACTOR.fullmatch(unit.strip().strip("[]()"))
+    unit = split_level(unit)[0].strip().strip("[]()")
+    match = _FACTOR.fullmatch(unit)
     if match and match[2]:
         return float(match[1]), canonical(match[2])
     return 1.0, canonical(unit)
