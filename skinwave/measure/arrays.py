@@ -6,7 +6,7 @@ eadf2037 (2023), doi 10.1126/sciadv.adf2037, record 10.5281/zenodo.7686560. Its 
 velocity along the laser in m/s at N places, M times, 2 repetitions, each with a reference r.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,11 +15,11 @@ import numpy as np
 from meshes import reading, subprocess_call
 from meshes.tetmesh import MeshError
 from simple_model.quantities import QUANTITIES
-from skinwave.measure import units
+from skinwave.measure import units, universal
 from skinwave.measure.delays import align_by_references
 from skinwave.measure.headers import NAMES, TIME, parse_heading
 from skinwave.measure.matlab import DAMAGED, read_arrays
-from skinwave.measure.recording import Given, Recording, unknown_places
+from skinwave.measure.recording import Given, Recording, factors_in, unknown_places
 from skinwave.measure.table import rises
 from skinwave.models import named, names
 from skinwave.typing import Floats
@@ -55,11 +55,49 @@ def read_npz(path: Path, given: Given) -> Recording:
         raise ValueError("the file cannot be read as .npz; save arrays by numpy.savez") from None
     if str(arrays.get("format", "")) == FORMAT:
         return _own(arrays)
+    if functions := sdynpy_functions(arrays):
+        return universal.recording_of(functions, given)
+    arrays = dict(_flat(arrays))
     if quantity := _response_quantity(arrays):
         kept = {name: arrays[name] for name in ("t", "probes", quantity)}
         recording = recording_of(kept, replace(given, variable=""))
         return replace(recording, unit=QUANTITIES[quantity].unit, sign=1)
     return recording_of(arrays, given)
+
+
+def _flat(arrays: Arrays) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield arrays, and the fields of structured ones as "array.field"."""
+    for name, array in arrays.items():
+        fields = array.dtype.names or ()
+        yield from _flat({f"{name}.{field}": array[field] for field in fields})
+        if not fields:
+            yield name, array
+
+
+def sdynpy_functions(arrays: Arrays) -> list[universal.Function]:
+    """Return the functions in a file of SDynPy's NDDataArray.save; none for other files."""
+    data = arrays.get("data", np.empty(0))
+    if (
+        not {"ordinate", "coordinate"} <= {*(data.dtype.names or ())}
+        or "function_type" not in arrays
+    ):
+        return []
+    kind = int(arrays["function_type"])
+    functions = []
+    for one in data.ravel():
+        ends = [(int(end["node"]), int(end["direction"])) for end in one["coordinate"].ravel()]
+        x = (
+            one["abscissa"]
+            if "abscissa" in data.dtype.names
+            else (
+                arrays["abscissa_start"] + arrays["abscissa_step"] * np.arange(len(one["ordinate"]))
+            )
+        )
+        functions.append(universal.Function(
+            type=kind, names=("", str(one["comment1"])), at=ends[0], by=(*ends, (0, 0))[1],
+            is_in_time=kind == universal.IN_TIME, x=x, y=one["ordinate"],
+        ))  # fmt: skip
+    return functions
 
 
 def read_mat(path: Path, given: Given) -> Recording:
@@ -102,14 +140,15 @@ def _response_quantity(arrays: Arrays) -> str:
 
 def recording_of(arrays: Arrays, given: Given) -> Recording:
     """Return the recording in arrays by name, "structure.name" for fields of structures."""
-    short = {_last(name): array for name, array in arrays.items()}
-    times, frequencies = _times(short), _vector(short, FREQUENCIES)
     name = given.variable or _motion(arrays)
     if name not in arrays:
         raise ValueError(f"no array is named '{name[:40]}'; give --variable as {_list(arrays)}")
+    short = _beside(arrays, name)
+    times, frequencies = _times(short), _vector(short, FREQUENCIES)
     values = np.asarray(arrays[name])
     if values.dtype.kind not in "fiuc" or not values.size:
         raise ValueError(f"the array '{name[:40]}' has no numbers; give another --variable")
+    units.check_linear(_word(short, "unit"), name)
     if len(times) and len(frequencies):
         if values.dtype.kind == "c":
             times = np.empty(0)
@@ -142,14 +181,46 @@ def recording_of(arrays: Arrays, given: Given) -> Recording:
     if is_zigzag:
         remarks.append("velocity along the laser, taken as normal to the skin")
     word = {key: _word(short, key) for key in ("quantity", "unit", "name")}
+    heading = parse_heading(_last(name))
+    quantity = heading.role if heading.role in units.MOTION else ""
+    if not word["unit"] and units.quantity_of(heading.unit) in ("", quantity):
+        word["unit"] = heading.unit
+    else:
+        word["unit"] += f" {units.split_level(heading.unit)[1]}".rstrip()
+    if len(frequencies) and not np.iscomplexobj(values):
+        raise ValueError(f"the spectrum '{name[:40]}' has no phase; save complex amplitudes")
+    factors = {
+        key: x.ravel()[0] for key, x in short.items() if x.size == 1 and x.dtype.kind in "fiu"
+    }
     has_places = len(places) == moved.shape[2]
     return Recording(
         values=moved, times=times, frequencies=frequencies, rate=rate,
-        quantity=word["quantity"] or ("velocity" if is_zigzag else MOTION.get(_last(name), "")),
+        quantity=word["quantity"] or ("velocity" if is_zigzag else quantity),
+        factors=factors_in(factors),
         unit=word["unit"] or "m/s" * is_zigzag, name=word["name"],
         places=places if has_places else unknown_places(moved.shape[2]),
         drive=drive if len(drive) == moved.shape[1] else np.empty(0), remarks=tuple(remarks),
     )  # fmt: skip
+
+
+def _beside(arrays: Arrays, name: str) -> Arrays:
+    """Return arrays by their last names: those of the same structure as one, then of others.
+
+    Arrays of several other structures are left out if they differ.
+    """
+    place, found = name.split("."), dict[str, list[tuple[int, np.ndarray]]]()
+    for other, array in arrays.items():
+        parts = other.split(".")[:-1]
+        same = sum(1 for a, b in zip(parts, place, strict=False) if a == b)
+        close = same if same == len(parts) else same - 100
+        found.setdefault(_last(other), []).append((close, array))
+    nearest = {}
+    for short, each in found.items():
+        best = max(close for close, _ in each)
+        first, *more = [array for close, array in each if close == best]
+        if all(np.array_equal(first, one) for one in more):
+            nearest[short] = first
+    return nearest
 
 
 def _last(name: str) -> str:

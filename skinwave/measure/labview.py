@@ -10,7 +10,7 @@ import numpy as np
 
 from meshes import reading
 from skinwave.measure.headers import Column, parse_heading
-from skinwave.measure.recording import Given, Recording
+from skinwave.measure.recording import Given, Recording, factors_in
 from skinwave.measure.table import Table, choose_columns, recording_of
 from skinwave.measure.units import canonical
 
@@ -67,16 +67,16 @@ def _simultaneous(channels: list[Channel], given: Given) -> Recording:
     if len(lengths) > 1 or len(wanted) > 1:
         each = ", ".join(f"{column.text[:20]} {len(x):,}" for column, x, *_ in channels)
         raise ValueError(
-            f"channels differ in length, step or start ({each[:120]}); choose simultaneous ones with "
-            "--columns"
+            f"channels differ in length, step or start ({each[:120]}); choose simultaneous ones "
+            "with --columns"
         )
     kept = [k for k, clock in enumerate(clocks) if len(channels[k][1]) in lengths
             and (not clock or not wanted or clock in wanted)]  # fmt: skip
     columns, series, _, properties = zip(*(channels[k] for k in kept), strict=True)
     clock = next(iter(wanted or {clocks[k] for k in kept}), ())
     notes = [*zip(("dt", "x0"), clock, strict=False)]
-    notes += [(name, str(value)) for k, own in zip(kept, properties, strict=True)
-              if k in of_motion for name, value in own.items()]  # fmt: skip
+    notes += [(name, repr(value)) for k, own in zip(kept, properties, strict=True)
+              if k in of_motion for name, value in factors_in(own).items()]  # fmt: skip
     numbers = np.column_stack(series).astype(float)
     table = Table(columns=columns, numbers=numbers, notes=tuple(notes))
     numbers_of = tuple(str(1 + kept.index(k)) for k in chosen)

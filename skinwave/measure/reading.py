@@ -36,8 +36,11 @@ def read_wav(path: Path, given: Given) -> Recording:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of other chunks
             rate, data = wavfile.read(io.BytesIO(content))
-    except Exception:  # whatever the library raises for damaged bytes
-        raise ValueError("the file is damaged or not a WAV file; export it again as PCM") from None
+    except Exception as error:  # whatever the library raises for damaged bytes
+        unknown = re.match(r"Unknown wave file format: (\w+)", str(error))
+        problem = f"the WAV file is coded as {unknown[1]}" if unknown else (
+            "the file is damaged or not a WAV file")  # fmt: skip
+        raise ValueError(f"{problem}; export it again as PCM") from None
     if len(data) < 2:
         raise ValueError(f"the WAV file has {len(data)} samples; give two or more")
     middle, full = {"u": (128, 128), "f": (0, 1)}.get(
@@ -46,8 +49,12 @@ def read_wav(path: Path, given: Given) -> Recording:
     with np.errstate(invalid="ignore"):  # nan is refused later
         values = (data.reshape(len(data), -1).astype(np.float64) - middle) / full
     columns = tuple(Column(text=f"channel {k + 1}", role="") for k in range(values.shape[1]))
-    notes = (("rate", repr(float(rate))),)
-    return recording_of(Table(columns=columns, numbers=values, notes=notes), given)
+    notes = [("rate", repr(float(rate)))]
+    if full > 1:
+        notes.append(("remark", f"1 is full scale, {full:,.0f} counts"))
+    for comment in re.findall(rb"ICMT.{4}([^\0]+)", content[-4096:] + content[:4096], re.DOTALL):
+        notes.append(("remark", f"comment in the file: {comment[:80].decode('latin-1').strip()}"))
+    return recording_of(Table(columns=columns, numbers=values, notes=tuple(notes)), given)
 
 
 def read_skinsource(path: Path, given: Given) -> Recording:

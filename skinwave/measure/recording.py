@@ -14,11 +14,12 @@ from skinwave.measure.measurement import UNEVEN, Measurement
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
-FACTOR = re.compile(
-    r"(^|[ _.\[-])(scal(e|ing)|skalierung|factor|faktor|calib(ration)?|cal|sensitivity|"
-    r"empfindlichkeit|gain|lsb|slope|resolution|units?_?per_?\w+|per_(count|bit|lsb))($|[ _.(\[-])",
+FACTOR = re.compile(  # names of numbers that scale counts
+    r"^(?!.*(vertical|horizontal|probe)).*(^|[ _.\[-])(scal(e|ing)|skalierung|fa[ck]tor|y?mult|cal|"
+    r"calib(ration)?|sensitivity|empfindlichkeit|gain|lsb|slope|resolution|units?_?per_?\w+|"
+    r"per_(count|bit|lsb))($|[ _.(\[-])",
     re.IGNORECASE,
-)  # names of numbers that scale counts
+)
 LARGEST_VALUE = 1e100  # in SI; squares of larger values may overflow
 LOWEST_RATE = 40.0  # Hz; half of it is below all vibrations that are felt
 EXAMPLE = "--quantity velocity --unit mm/s"
@@ -129,8 +130,8 @@ def _amplitude(recording: Recording, given: Given, remarks: list[str]) -> float:
     is_level = np.isrealobj(recording.values) and np.nanmin(recording.values, initial=0.0) >= 0
     if level in (units.RMS, units.PEAK_TO_PEAK) or (level and is_level and not given.unit):
         raise ValueError(
-            f"{level} values over time are a level, not a waveform. Export the waveform; if this is "
-            'one, give --unit "mm/s peak" or another unit'
+            f"{level} values over time are a level, not a waveform. Export the waveform; if this "
+            'is one, give its unit as, for example, --unit "mm/s peak"'
         )
     return 1.0
 
@@ -144,15 +145,15 @@ def _check_counts(recording: Recording, given: Given, unit: str, remarks: list[s
         values = recording.values[~np.isnan(recording.values)]
         if (values == np.rint(values.real)).all():
             raise ValueError(
-                f"values are whole numbers, and {text} seems to be their factor; give the motion that "
-                f'1 stands for, such as --unit "{factor:g} {unit}"'
+                f"values are whole numbers, and {text} seems to be their factor; give the motion "
+                f'that 1 stands for, such as --unit "{factor:g} {unit}"'
             )
         remarks.append(f"{text} is not applied; if values lack it, give a --unit that contains it")
 
 
 def factors_in(texts: Mapping[str, object]) -> dict[str, float]:
     """Return the numbers other than 1 whose names say that they scale values."""
-    found = {name: number_in(str(value)) for name, value in texts.items() if FACTOR.search(name)}
+    found = {name: number_in(str(value)) for name, value in texts.items() if FACTOR.match(name)}
     return {name: x for name, x in found.items() if x not in (None, 0.0, 1.0)}
 
 

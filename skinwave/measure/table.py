@@ -55,7 +55,9 @@ _UNIT = re.compile(r"(vertical|y)?[ _-]*(units?|einheit)")
 _DIRECTION = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
 _SIGNED = re.compile(r"([-+])([xyz])(?![a-z])|(?<![a-z])([xyz])([-+])(?!\w)", re.IGNORECASE)
 # Notes that tell what amplitudes are; averages of a spectrum do not.
-_SCALING = re.compile(r"(?!.*(averag|mittel)).*(scal|skal|signal|amplitud|magnitud|spe[ck]t|type|detect)")
+_SCALING = re.compile(
+    r"(?!.*(averag|mittel)).*(scal|skal|signal|amplitud|magnitud|spe[ck]t|type|detect)"
+)
 Notes = list[tuple[str, str]]
 
 
@@ -139,7 +141,9 @@ def _sign(columns: list[Column], given: Given) -> int:
     """
     named = [_SIGNED.findall(column.text) for column in columns]
     pairs = {tuple((a + d, (b + c).lower()) for a, b, c, d in each) for each in named}
-    both = {(pair[0][0] == pair[1][0], pair[0][1] == pair[1][1]) for pair in pairs if len(pair) == 2}
+    both = {
+        (pair[0][0] == pair[1][0], pair[0][1] == pair[1][1]) for pair in pairs if len(pair) == 2
+    }
     if both and both not in ({(True, True)}, {(False, True)}) and not given.sign:
         raise ValueError(
             "motion and excitation differ in axis, or their signs from column to column; choose "
@@ -160,8 +164,10 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
         if level and (not value or _SCALING.fullmatch(key)):
             columns = [column.with_level(level) for column in columns]
         elif level and not parse_heading(key).role:  # not the line of headings
-            remarks.append(f"the file says '{key[:40]}: {value[:40]}'; values are taken as amplitudes "
-                           f'unless their unit is given as, for example, --unit "mm/s {level}"')  # fmt: skip
+            remarks.append(
+                f"the file says '{key[:40]}: {value[:40]}'; values are taken as amplitudes, unless "
+                f'a unit such as --unit "mm/s {level}" is given'
+            )
     has_axis = bool(roles & {TIME, FREQUENCY})
     has_lengths = any(canonical(column.unit) in LENGTHS for column in columns)
     has_places = {X, Y} <= roles and (has_axis or has_lengths)
@@ -239,8 +245,10 @@ def _one_time(columns: list[Column], numbers: Floats, chosen: list[int]) -> list
     varying = [k for k in times if len(numbers) == 1 or np.ptp(numbers[:, k])] or times[:1]
     varying = [k for k in varying if columns[k].unit] or varying
     leads = not any(column.may_be_motion for column in columns[: varying[0]])
-    own = {max((k for k in varying if k < at), default=varying[0]) if leads
-           else min((k for k in varying if k > at), default=varying[-1]) for at in chosen}  # fmt: skip
+    if leads:
+        own = {max((k for k in varying if k < at), default=varying[0]) for at in chosen}
+    else:
+        own = {min((k for k in varying if k > at), default=varying[-1]) for at in chosen}
     first, *others = sorted(own) or varying
     for k in others:
         if not np.array_equal(numbers[:, k], numbers[:, first], equal_nan=True):

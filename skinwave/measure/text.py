@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, time
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -135,10 +136,10 @@ def _layouts(rows: list[str]) -> Iterator[_Layout]:
 
 def _with_shorter(layout: _Layout, rows: list[str], names: list[str]) -> _Layout:
     """Return the layout with named columns of numbers that end before the others."""
-    cells = [layout.cells(line) for line in rows]
-    more = [k for k, name in enumerate(names) if name and k not in layout.numeric
-            and 2 * sum(k < len(row) and _is_number(row[k]) for row in cells) > len(rows)]  # fmt: skip
-    return replace(layout, numeric=tuple(sorted((*layout.numeric, *more))))
+    columns = zip_longest(*(layout.cells(line) for line in rows), fillvalue="")
+    counts = [sum(map(_is_number, column)) for column in columns]
+    more = {k for k, name in enumerate(names[: len(counts)]) if name and 2 * counts[k] > len(rows)}
+    return replace(layout, numeric=tuple(sorted({*layout.numeric, *more})))
 
 
 def _cells(line: str, delimiter: str, has_commas: bool = False) -> list[str]:

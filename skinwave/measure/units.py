@@ -38,7 +38,8 @@ _SPELLINGS = {
         "ns": "nsec nanosecond nanoseconds", "Hz": "hz hertz", "kHz": "khz kilohertz",
         "deg": "deg degree degrees grad degdeg", "rad": "rad radian radians",
         "um": "micron microns micrometer micrometre", "V": "v volt volts", "N": "newton newtons",
-        "g": "g gn g's", "in": "inch inches zoll", "ft": "foot feet", "mil": "mils thou", "in/s": "ips",
+        "g": "g gn g's", "in": "inch inches zoll", "ft": "foot feet", "mil": "mils thou",
+        "in/s": "ips",
     }.items()
     for word in words.split()
 }  # fmt: skip
@@ -81,8 +82,8 @@ def check_linear(unit: str, text: str = "") -> None:
             raise ValueError(f"'{one[:40]}' is a level in dB, not a unit; export linear values")
     if _POWER_UNIT.search(canonical(unit)) or _POWER_WORD.search(text):
         raise ValueError(
-            f"'{(text or unit)[:40]}' is a power or a density and has no phase; export waveforms or "
-            "complex amplitudes"
+            f"'{(text or unit)[:40]}' is a power or a density and has no phase; export waveforms "
+            "or complex amplitudes"
         )
 
 

@@ -6,9 +6,9 @@ Each set is a place; further sets of a node are repetitions. Coordinates are tho
 
 import re
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,66 +23,85 @@ FUNCTION, NODES, LENGTH_UNIT = 58, (15, 2411), 164  # types of sets
 QUANTITIES = {8: "displacement", 11: "velocity", 12: "acceleration"}
 SI = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
 GENERAL, IN_TIME, RESPONSE, SPECTRUM = 0, 1, 4, 12  # types of functions that have a phase
+SINGLE, COMPLEX = (2, 5), (5, 6)  # types of values
 TIME, FREQUENCY = 17, 18  # types of abscissas
 SET_TAG = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")  # line before and after each set
+SET_TYPE = re.compile(rb"[^\r\n]*[\r\n]+ *(\d+)")
+HEADER = re.compile(rb"(?:[^\r\n]*(?:\r\n|\r|\n)){13}")
+NUMBER = re.compile(
+    rb"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[ED][-+]?\d+|[-+]\d{3}(?![\d.]))?|nan|inf)", re.IGNORECASE
+)
+SHORT = re.compile(r"(\d)([-+]\d{3})$")  # "1.5-100" of Fortran
 AXES = {"x": 1, "y": 2, "z": 3}  # z is out of the body, towards a vibrometer above it
 REFERENCE = re.compile(r"ref(erence)?\d*\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Function:
-    """A set 58."""
+    """A set 58, or a function of SDynPy."""
 
     type: int
-    quantity: str  # of motion, or ""
-    unit: str
-    is_per_reference: bool
+    quantity: str = ""  # of motion
+    unit: str = ""
+    is_per_reference: bool = False
     names: tuple[str, str]  # of the response entity, and of the function
-    node: int
-    reference_node: int
-    direction: int  # signed number of the axis, 0 if unknown
+    at: tuple[int, int]  # node and signed number of the axis of the response, 0 if unknown,
+    by: tuple[int, int] = (0, 0)  # and of the excitation of a frequency response
     is_in_time: bool
-    is_reference: bool
+    is_reference: bool = False
+    is_other: bool = False  # no motion, such as a force
     x: Floats
     y: np.ndarray
 
 
 def read(path: Path, given: Given) -> Recording:
-    """Return the recording in a Universal File.
+    """Return the recording in a Universal File."""
+    functions, positions, per_metre = _sets(path)
+    return recording_of(functions, given, positions, per_metre)
+
+
+def recording_of(
+    functions: list[Function],
+    given: Given,
+    positions: Mapping[int, tuple[float, float]] | None = None,
+    per_metre: float = 1.0,
+) -> Recording:
+    """Return the recording in functions at nodes with given positions, in a unit of length.
 
     References recorded with each place align the places; a single reference is the drive. Raises a
     ValueError if no motion is along the direction, or if the sets do not fit together.
     """
-    functions, positions, per_metre = _sets(path)
     motion, others = _motion(functions, given)
     _check_alike(motion)
-    motion, sign = _along_axis(motion)
+    motion, sign = _along_axis(motion, given)
     first, groups = motion[0], _by_node(motion)
     values = np.moveaxis(np.array([[one.y for one in group] for _, group in groups]), 0, 2)
     if not first.is_in_time and not np.iscomplexobj(values):
         raise ValueError("the spectra have no phase; export complex spectra or time responses")
     nodes = [node for node, _ in groups]
     values, drive, remarks = _align(values, others, first, nodes)
-    directions = [abs(one.direction) for one in functions if one.quantity]
-    if left_out := sum(d not in (0, abs(first.direction)) for d in directions):
+    known = [one for one in functions if not (one.is_other or one.is_reference)]
+    if left_out := sum(one.at[1] not in (0, first.at[1], -first.at[1]) for one in known):
         remarks.append(f"{left_out} functions of other directions are left out")
     if len(groups) == 1 and len(motion) > 1:
         remarks.append(f"{len(motion)} sets of one node are taken as repetitions")
     if first.type == RESPONSE or first.is_per_reference:
         remarks.insert(0, "frequency responses: values are per unit of the reference")
-    unit = first.unit
+        remarks += _driving_points(motion, given)
+    unit, level = units.split_level(first.unit)
     if not unit and first.quantity and not given.unit:
         unit = f"{1 / per_metre!r} {SI[first.quantity]}"
         remarks.insert(0, f"the file gives no unit; {unit} is assumed, and --unit replaces it")
     places = unknown_places(len(nodes))
-    if set(nodes) <= positions.keys():
+    if positions and set(nodes) <= positions.keys():
         places = np.array([positions[node] for node in nodes]) / per_metre
     times, frequencies = first.x[: values.shape[1]], np.empty(0)
     if not first.is_in_time:
         times, frequencies = frequencies, first.x
     return Recording(
-        values=values, times=times, frequencies=frequencies, quantity=first.quantity, unit=unit,
-        places=places, sign=sign, drive=drive, name=first.names[1], remarks=tuple(remarks),
+        values=values, times=times, frequencies=frequencies, quantity=first.quantity,
+        unit=f"{unit} {level}".strip(), places=places, sign=sign, drive=drive, name=first.names[1],
+        remarks=tuple(remarks),
     )  # fmt: skip
 
 
@@ -92,83 +111,142 @@ def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], f
         import pyuff
     except ImportError:
         raise ValueError('Universal Files need pyuff; pip install "skinwave[measure]"') from None
-    with reading.open_regular(path, LARGEST) as content:
-        if len(SET_TAG.findall(content.read())) % 2:
-            raise ValueError("the file ends within a set; export it again")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            file = pyuff.UFF(str(path))
-            types = [int(kind) for kind in file.get_set_types()]
-            wanted = {FUNCTION, *NODES, LENGTH_UNIT}
-            sets = [file.read_sets(k) for k, kind in enumerate(types) if kind in wanted]
-    except Exception:  # pyuff raises plain exceptions
-        raise ValueError("the file is damaged or not a Universal File; export it as text") from None
+    with reading.open_regular(path, LARGEST) as file:
+        content = file.read()
+    tags = [match.start() for match in SET_TAG.finditer(content)]
+    if len(tags) % 2:
+        raise ValueError("the file ends within a set; export it again")
+    blocks = [content[k:end] for k, end in zip(tags[::2], tags[1::2], strict=True)]
+    types = [int(found[1]) if (found := SET_TYPE.match(block)) else 0 for block in blocks]
     if FUNCTION not in types:
         known = f", only {', '.join(map(str, sorted(set(types))))}" if types else ""
         raise ValueError(f"the file has no set 58{known}; export functions")
     positions: dict[int, tuple[float, float]] = {}
-    for one in sets:
-        if one.get("type") in NODES:
+    per_metre = 1.0
+    for k, kind in enumerate(types):
+        if kind not in (*NODES, LENGTH_UNIT):
+            continue
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                one = pyuff.UFF(str(path)).read_sets(k)
+        except Exception:  # pyuff raises plain exceptions
+            raise ValueError(f"set {kind} cannot be read; export the functions alone") from None
+        if kind == LENGTH_UNIT:
+            length = float(one.get("length", 1.0))
+            per_metre = length if 0 < length < np.inf else 1.0
+        else:
             rows = zip(one["node_nums"], one["x"], one["y"], strict=False)
             positions |= {int(node): (float(x), float(y)) for node, x, y in rows}
-    lengths = [float(one.get("length", 1.0)) for one in sets if one.get("type") == LENGTH_UNIT]
-    per_metre = lengths[0] if lengths and 0 < lengths[0] < np.inf else 1.0
-    return [_function(one) for one in sets if one.get("type") == FUNCTION], positions, per_metre
+    functions = [
+        _function(block) for block, kind in zip(blocks, types, strict=True) if kind == FUNCTION
+    ]
+    return functions, positions, per_metre
 
 
-def _function(one: dict[str, Any]) -> Function:
-    """Return a set 58 with as many values as its header states; line ends may follow these."""
+def _function(block: bytes) -> Function:
+    """Return the function in the text of a set 58, or of a set 58b with binary values."""
+    head = HEADER.match(block)
+    if not head:
+        raise ValueError("a set 58 ends within its header; export it again")
+    lines = head[0].decode(errors="replace").splitlines()
 
-    def text(key: str) -> str:
-        value = str(one.get(key, "")).strip()
-        return "" if value.upper() == "NONE" else value
+    def cells(line: int, *widths: int) -> list[str]:
+        ends = np.cumsum(widths)
+        each = [
+            lines[line][end - width : end].strip() for end, width in zip(ends, widths, strict=True)
+        ]
+        return ["" if cell.upper() == "NONE" else cell for cell in each]
 
-    def number(key: str) -> int:
-        return int(one.get(key, 0))
-
-    count, data = number("num_pts"), np.asarray(one.get("data", ()))
-    if count < 2 or len(data) < count:
-        raise ValueError(f"a set 58 has {len(data)} of {count} values; export it again")
-    kind, abscissa = number("func_type"), number("abscissa_spec_data_type")
+    try:
+        at_by = cells(7, 5, 10, 5, 10, 11, 10, 4, 11, 10, 4)
+        kind, *ends = (int(at_by[k] or 0) for k in (0, 5, 6, 8, 9))
+        form, count, is_even = (int(x or 0) for x in cells(8, 10, 10, 10))
+        start, step = (float(x.upper().replace("D", "E") or 0) for x in cells(8, 30, 13, 13)[1:])
+        (abscissa, _, axis), (ordinate, label, unit), (_, _, per) = (
+            (int(one[0] or 0), *one[-2:]) for one in (cells(k, 10, 15, 21, 21) for k in (9, 10, 11))
+        )
+        values = _numbers(block[head.end() :], form, cells(1, 7, 6, 6))
+    except ValueError as error:
+        problem = str(error) if "export" in str(error) else "a set 58 has a damaged header or value"
+        raise ValueError(f"{problem.partition('; ')[0]}; export it again as text") from None
+    parts = 1 + (form in COMPLEX) + (not is_even)
+    values = values[: len(values) // parts * parts].reshape(-1, parts)
+    if count < 2 or len(values) < count:
+        raise ValueError(f"a set 58 has {len(values)} of {count} values; export it again")
+    x = start + step * np.arange(count) if is_even else values[:count, 0]
+    y = values[:count, -1] if form not in COMPLEX else values[:count, -2:] @ np.array([1, 1j])
     is_in_time = abscissa == TIME if abscissa in (TIME, FREQUENCY) else kind == IN_TIME
-    unit, is_per_reference = units.per_reference(text("ordinate_axis_units_lab"))
     known, dimension = (units.TIMES, "time") if is_in_time else (units.FREQUENCIES, "frequency")
-    axis = text("abscissa_axis_units_lab")
-    divisor = units.divisor(axis, known, dimension) if axis else 1.0
+    unit, is_per_reference = units.per_reference(f"{unit}/{per}" if unit and per else unit)
+    ids = [line.strip() for line in lines[2:7]]
+    said = [label, *([] if is_in_time or kind == RESPONSE else ids)]
+    level = next(filter(None, (units.split_level(text)[1] for text in [unit, *said])), "")
+    bare = units.split_level(unit)[0]
     return Function(
-        type=kind, unit=unit, is_per_reference=is_per_reference,
-        quantity=QUANTITIES.get(number("ordinate_spec_data_type"), "") or units.quantity_of(unit),
-        names=(text("rsp_ent_name"), text("id1")), node=number("rsp_node"),
-        reference_node=number("ref_node"), direction=number("rsp_dir"), is_in_time=is_in_time,
-        is_reference=any(REFERENCE.match(text(key)) for key in ("id1", "id2")),
-        x=units.in_si(np.asarray(one["x"], float)[:count], divisor), y=data[:count],
+        type=kind, unit=f"{bare} {level}".strip(), is_per_reference=is_per_reference,
+        quantity=QUANTITIES.get(ordinate, "") or units.quantity_of(bare),
+        names=(at_by[4], "" if ids[0].upper() == "NONE" else ids[0]),
+        at=(ends[0], ends[1]), by=(ends[2], ends[3]) if kind == RESPONSE else (0, 0),
+        is_in_time=is_in_time, is_reference=any(REFERENCE.match(text) for text in ids[:2]),
+        is_other=ordinate not in (0, 1, *QUANTITIES), y=y,
+        x=units.in_si(x, units.divisor(axis, known, dimension) if axis else 1.0),
     )  # fmt: skip
+
+
+def _numbers(body: bytes, form: int, coding: list[str]) -> Floats:
+    """Return the numbers of a set: of text in columns of any width, or binary ones."""
+    if coding[0].lower() == "58b":
+        if coding[2] not in ("", "2"):
+            raise ValueError("binary values that are not IEEE 754 are not supported; export text")
+        kind = ("<" if coding[1] == "1" else ">") + ("f4" if form in SINGLE else "f8")
+        size = np.dtype(kind).itemsize
+        return np.frombuffer(body[: len(body) // size * size], kind).astype(np.float64)
+    texts = (found.decode().upper().replace("D", "E") for found in NUMBER.findall(body))
+    return np.array([float(SHORT.sub(r"\1E\2", text)) for text in texts])
 
 
 def _motion(functions: list[Function], given: Given) -> tuple[list[Function], list[Function]]:
     """Return functions of motion along the direction, with phase, and all others."""
     with_phase = [f for f in functions if f.type in (GENERAL, IN_TIME, RESPONSE, SPECTRUM)]
     if not with_phase:
-        raise ValueError(f"functions of type {functions[0].type} have no phase; export spectra")
-    others = [one for one in with_phase if one.is_reference]
+        raise ValueError(
+            f"functions of type {functions[0].type} are no waveforms, spectra or frequency "
+            "responses; export these"
+        )
     motion = [one for one in with_phase if not one.is_reference]
     quantities = {one.quantity for one in motion} - {""}
-    if quantities or not (given.unit or given.quantity):
-        others += [one for one in motion if not one.quantity]
+    if quantities:
         wanted = {given.quantity} if given.quantity in quantities else quantities
-        motion = [one for one in motion if one.quantity in wanted]
+    else:
+        wanted = {""} if given.unit or given.quantity else set()
+    motion = [
+        one for one in motion if one.quantity in wanted and (one.quantity or not one.is_other)
+    ]
+    others = [
+        one for one in with_phase if one not in motion and (one.is_reference or not one.quantity)
+    ]
     if not motion:
-        raise ValueError('no function has a unit of motion; give --unit, such as "20 mm/s"')
+        raise ValueError(
+            "the functions are no displacement, velocity or acceleration; export motion"
+            if all(one.is_other for one in with_phase)
+            else 'no function has a unit of motion; give --unit, such as "20 mm/s"'
+        )
     direction = given.direction or "z"
-    along = [one for one in motion if abs(one.direction) in (0, AXES[direction])]
+    along = [one for one in motion if abs(one.at[1]) in (0, AXES[direction])]
+    names = {number: name for name, number in AXES.items()}
     if not along:
-        names = {number: name for name, number in AXES.items()}
-        known = sorted({names.get(abs(one.direction), "rotation") for one in motion})
+        known = sorted({names.get(abs(one.at[1]), "rotation") for one in motion})
         raise ValueError(f"no motion is along {direction}; give --direction {', '.join(known)}")
-    nodes = sorted({one.reference_node for one in along})
-    if len(nodes) > 1 and all(one.type == RESPONSE for one in along):
-        raise ValueError(f"responses have the references {', '.join(map(str, nodes))}; export one")
+    along = [one for one in along if abs(one.by[1]) in (0, AXES[direction])] or along
+    excited = {(abs(one.by[1]), one.by[0]) for one in along}
+    if len(excited) > 1:
+        is_one_axis = len({axis for axis, _ in excited}) == 1
+        each = ", ".join(
+            f"{node}" if is_one_axis else f"{node} {names.get(axis, 'rotation')}"
+            for axis, node in sorted(excited)
+        )
+        raise ValueError(f"responses have the references {each}; export one")
     return along, others
 
 
@@ -192,26 +270,54 @@ def _by_node(motion: list[Function]) -> list[tuple[int, list[Function]]]:
     """Return nodes with equal numbers of functions; functions with distinct names are places."""
     groups: dict[int, list[Function]] = {}
     for one in motion:
-        groups.setdefault(one.node, []).append(one)
+        groups.setdefault(one.at[0], []).append(one)
     is_one_node = len(groups) == 1 and 0 not in groups  # whose titles may number repetitions
     names = {one.names[:1] if is_one_node else one.names for one in motion}
     counts = {len(group) for group in groups.values()}
     if (len(groups) == 1 or len(counts) > 1) and len(names) == len(motion):
-        return [(one.node, [one]) for one in motion]
+        return [(one.at[0], [one]) for one in motion]
     if len(counts) > 1:
         raise ValueError(f"nodes have {min(counts)} to {max(counts)} sets 58; export equally many")
     return list(groups.items())
 
 
-def _along_axis(motion: list[Function]) -> tuple[list[Function], int]:
-    """Return functions along the positive axis, and the sign into the body: -1 for z, else 0."""
-    directions = [one.direction for one in motion]
-    if 0 in directions and any(directions):
+def _along_axis(motion: list[Function], given: Given) -> tuple[list[Function], int]:
+    """Return functions along the positive axis, and the sign into the body.
+
+    It is -1 for z, and 0 for other axes. A frequency response whose excitation has a direction is
+    that along the positive axis of both, which is also that of both into the body: 1.
+    """
+    at, by = (
+        {one[1] for one in pairs} for pairs in zip(*((f.at, f.by) for f in motion), strict=True)
+    )
+    if any(0 in both and any(both) for both in (at, by)):
         raise ValueError("only some sets 58 have a direction; export one kind")
-    if 0 in directions:
+    if not any(at):
         return motion, 0
-    turned = [replace(one, y=np.sign(one.direction) * one.y) for one in motion]
-    return turned, -(abs(directions[0]) == AXES["z"])
+    axis, excited = (abs(next(iter(both))) for both in (at, by))
+    if excited not in (0, axis) and not given.sign:
+        raise ValueError(
+            "motion and excitation are along different axes, which gives no sign; export responses "
+            "to a force along the motion, or give --positive"
+        )
+    turned = [
+        replace(one, y=np.sign(one.at[1]) * (np.sign(one.by[1]) or 1) * one.y) for one in motion
+    ]
+    return turned, 1 if excited else -(axis == AXES["z"])
+
+
+def _driving_points(motion: list[Function], given: Given, least: float = 0.1) -> list[str]:
+    """Return a warning if a driving point gives more energy than a fraction of the largest."""
+    quantity = motion[0].quantity or given.quantity or units.quantity_of(given.unit)
+    warned = []
+    for one in motion if quantity in units.MOTION else ():
+        moving = one.x > 0
+        order = 1 - list(units.MOTION).index(quantity)
+        mobility = one.y[moving] * (2j * np.pi * one.x[moving]) ** order
+        if one.at == one.by and mobility.real.sum() < -least * np.abs(mobility).sum():
+            warned.append(f"the body gives energy to the excitation at node {one.at[0]}: its sign "
+                          "or that of the phase is wrong; check --positive")  # fmt: skip
+    return warned
 
 
 def _align(
@@ -227,7 +333,7 @@ def _align(
         return values, np.empty(0), [] if is_simultaneous else [NOT_SIMULTANEOUS]
     by_node: dict[int, list[np.ndarray]] = {}
     for one in references:
-        by_node.setdefault(one.node, []).append(one.y)
+        by_node.setdefault(one.at[0], []).append(one.y)
     if sorted(by_node) == sorted(nodes) and {len(one) for one in by_node.values()} == {runs}:
         each = np.array([by_node[node] for node in nodes])
     else:  # in the order of the file
