@@ -76,26 +76,20 @@ def _flat(arrays: Arrays) -> Iterator[tuple[str, np.ndarray]]:
 
 def sdynpy_functions(arrays: Arrays) -> list[universal.Function]:
     """Return the functions in a file of SDynPy's NDDataArray.save; none for other files."""
-    data = arrays.get("data", np.empty(0))
-    if (
-        not {"ordinate", "coordinate"} <= {*(data.dtype.names or ())}
-        or "function_type" not in arrays
-    ):
+    data, kind = arrays.get("data", np.empty(0)), int(arrays.get("function_type", -1))
+    names = data.dtype.names or ()
+    if not {"ordinate", "coordinate"} <= {*names} or kind < 0:
         return []
-    kind = int(arrays["function_type"])
     functions = []
     for one in data.ravel():
-        ends = [(int(end["node"]), int(end["direction"])) for end in one["coordinate"].ravel()]
-        x = (
-            one["abscissa"]
-            if "abscissa" in data.dtype.names
-            else (
-                arrays["abscissa_start"] + arrays["abscissa_step"] * np.arange(len(one["ordinate"]))
-            )
-        )
+        at, *by = [(int(end["node"]), int(end["direction"])) for end in one["coordinate"].ravel()]
+        x, y = (np.asarray(one[name] if name in names else 0) for name in ("abscissa", "ordinate"))
+        if "abscissa" not in names:
+            x = arrays["abscissa_start"] + arrays["abscissa_step"] * np.arange(len(y))
         functions.append(universal.Function(
-            type=kind, names=("", str(one["comment1"])), at=ends[0], by=(*ends, (0, 0))[1],
-            is_in_time=kind == universal.IN_TIME, x=x, y=one["ordinate"],
+            type=kind, names=("", str(one["comment1"])), at=at, x=x, y=y,
+            by=by[0] if by and kind == universal.RESPONSE else (0, 0),
+            is_in_time=kind == universal.IN_TIME,
         ))  # fmt: skip
     return functions
 
@@ -140,6 +134,8 @@ def _response_quantity(arrays: Arrays) -> str:
 
 def recording_of(arrays: Arrays, given: Given) -> Recording:
     """Return the recording in arrays by name, "structure.name" for fields of structures."""
+    if given.direction:
+        raise ValueError("--direction has no effect on arrays by name; choose with --variable")
     name = given.variable or _motion(arrays)
     if name not in arrays:
         raise ValueError(f"no array is named '{name[:40]}'; give --variable as {_list(arrays)}")
@@ -189,14 +185,16 @@ def recording_of(arrays: Arrays, given: Given) -> Recording:
         word["unit"] += f" {units.split_level(heading.unit)[1]}".rstrip()
     if len(frequencies) and not np.iscomplexobj(values):
         raise ValueError(f"the spectrum '{name[:40]}' has no phase; save complex amplitudes")
-    factors = {
-        key: x.ravel()[0] for key, x in short.items() if x.size == 1 and x.dtype.kind in "fiu"
-    }
+    numbers = {key: x for key, x in short.items() if x.size and x.dtype.kind in "fiu"}
+    factors = factors_in({key: x.ravel()[0] for key, x in numbers.items()})
+    several = [key for key in factors if numbers[key].size > 1]
+    if several and np.array_equal(values, np.rint(values.real)):
+        raise ValueError(f"'{several[0]}' has several factors; save the values multiplied by them")
     has_places = len(places) == moved.shape[2]
     return Recording(
         values=moved, times=times, frequencies=frequencies, rate=rate,
         quantity=word["quantity"] or ("velocity" if is_zigzag else quantity),
-        factors=factors_in(factors),
+        factors=factors,
         unit=word["unit"] or "m/s" * is_zigzag, name=word["name"],
         places=places if has_places else unknown_places(moved.shape[2]),
         drive=drive if len(drive) == moved.shape[1] else np.empty(0), remarks=tuple(remarks),
@@ -206,20 +204,19 @@ def recording_of(arrays: Arrays, given: Given) -> Recording:
 def _beside(arrays: Arrays, name: str) -> Arrays:
     """Return arrays by their last names: those of the same structure as one, then of others.
 
-    Arrays of several other structures are left out if they differ.
+    Arrays of several other structures are empty if they differ.
     """
-    place, found = name.split("."), dict[str, list[tuple[int, np.ndarray]]]()
-    for other, array in arrays.items():
-        parts = other.split(".")[:-1]
-        same = sum(1 for a, b in zip(parts, place, strict=False) if a == b)
-        close = same if same == len(parts) else same - 100
-        found.setdefault(_last(other), []).append((close, array))
-    nearest = {}
-    for short, each in found.items():
-        best = max(close for close, _ in each)
-        first, *more = [array for close, array in each if close == best]
-        if all(np.array_equal(first, one) for one in more):
-            nearest[short] = first
+
+    def closeness(other: str) -> int:
+        structure = other[: other.rfind(".") + 1]
+        return len(structure) if name.startswith(structure) else -1
+
+    nearest: dict[str, np.ndarray] = {}
+    for other in sorted(arrays, key=closeness):
+        short = _last(other)
+        is_unclear = closeness(other) < 0 and short in nearest
+        is_unclear &= not np.array_equal(nearest.get(short, ()), arrays[other])
+        nearest[short] = np.empty(0) if is_unclear else arrays[other]
     return nearest
 
 

@@ -12,7 +12,6 @@ from meshes import reading
 from skinwave.measure.headers import Column, parse_heading
 from skinwave.measure.recording import Given, Recording, factors_in
 from skinwave.measure.table import Table, choose_columns, recording_of
-from skinwave.measure.units import canonical
 
 LARGEST = 1_000_000_000  # bytes
 AXIS_UNITS = {"Time": "s", "Frequency": "Hz"}
@@ -72,11 +71,11 @@ def _simultaneous(channels: list[Channel], given: Given) -> Recording:
         )
     kept = [k for k, clock in enumerate(clocks) if len(channels[k][1]) in lengths
             and (not clock or not wanted or clock in wanted)]  # fmt: skip
-    columns, series, _, properties = zip(*(channels[k] for k in kept), strict=True)
+    columns, series, *_ = zip(*(channels[k] for k in kept), strict=True)
     clock = next(iter(wanted or {clocks[k] for k in kept}), ())
     notes = [*zip(("dt", "x0"), clock, strict=False)]
-    notes += [(name, repr(value)) for k, own in zip(kept, properties, strict=True)
-              if k in of_motion for name, value in factors_in(own).items()]  # fmt: skip
+    notes += [(f"{name} of {channels[k][0].text}", repr(value)) for k in of_motion
+              for name, value in factors_in(channels[k][3]).items()]  # fmt: skip
     numbers = np.column_stack(series).astype(float)
     table = Table(columns=columns, numbers=numbers, notes=tuple(notes))
     numbers_of = tuple(str(1 + kept.index(k)) for k in chosen)
@@ -106,7 +105,7 @@ def read_tdms(path: Path, given: Given) -> Recording:
         if values.dtype.kind not in "fiuM" or values.size < 2:
             continue
         own, name = channel.properties, channel.name
-        unit = canonical(str(own.get("unit_string", "")))
+        unit = str(own.get("unit_string", "")).strip()
         if values.dtype.kind == "M":
             values, unit = (values - values[0]) / np.timedelta64(1, "s"), "s"
         name = f"{channel.group_name}/{name}" if names.count(name) > 1 else name

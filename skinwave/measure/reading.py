@@ -14,7 +14,7 @@ from meshes import reading
 from skinwave.measure import arrays, labview, text, universal
 from skinwave.measure.headers import Column
 from skinwave.measure.measurement import Measurement
-from skinwave.measure.recording import Given, Recording, complete, unknown_places
+from skinwave.measure.recording import FACTOR, Given, Recording, complete, unknown_places
 from skinwave.measure.table import Table, recording_of
 from skinwave.measure.units import metres
 from skinwave.typing import Floats
@@ -52,8 +52,14 @@ def read_wav(path: Path, given: Given) -> Recording:
     notes = [("rate", repr(float(rate)))]
     if full > 1:
         notes.append(("remark", f"1 is full scale, {full:,.0f} counts"))
-    for comment in re.findall(rb"ICMT.{4}([^\0]+)", content[-4096:] + content[:4096], re.DOTALL):
-        notes.append(("remark", f"comment in the file: {comment[:80].decode('latin-1').strip()}"))
+    comment = re.search(rb"ICMT.{4}([^\0]+)", content[-4096:] + content[:4096], re.DOTALL)
+    said = comment[1][:80].decode("latin-1").strip() if comment else ""
+    notes.append(("remark", said and f"comment in the file: {said}"))
+    if FACTOR.match(said) and full > 1 and not re.match(r"[\d.]", given.unit):
+        raise ValueError(
+            f"the comment '{said}' seems to give the motion of a count; give that of full scale, "
+            f'{full:,.0f} counts, such as --unit "20 mm/s"'
+        )
     return recording_of(Table(columns=columns, numbers=values, notes=tuple(notes)), given)
 
 
@@ -97,7 +103,8 @@ class Reader:
 READERS = (
     Reader(name="text", suffixes=(".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm"), read=text.read),
     Reader(name="TDMS", suffixes=(".tdms",), read=labview.read_tdms),
-    Reader(name="NumPy", suffixes=(".npz",), read=arrays.read_npz, choices=("variable",)),
+    Reader(name="NumPy", suffixes=(".npz",), read=arrays.read_npz,
+           choices=("variable", "direction")),
     Reader(name="sound", suffixes=(".wav",), read=read_wav),
     Reader(name="MATLAB", suffixes=(".mat",), read=arrays.read_mat, choices=("variable",)),
     Reader(name="Universal File Format 58", suffixes=(".uff", ".unv", ".uf", ".58"),
@@ -152,7 +159,7 @@ def _reader(path: Path) -> Reader:
         if path.suffix.lower() in reader.suffixes:
             return reader
     known = ", ".join(suffix for reader in READERS for suffix in reader.suffixes)
-    raise ValueError(f"{path}: unknown format '{path.suffix}'; use one of {known}")
+    raise ValueError(f"{path}: unknown format '{path.suffix}'; export CSV, or use one of {known}")
 
 
 def parse_places(words: str) -> Floats:

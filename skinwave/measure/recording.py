@@ -17,7 +17,7 @@ from skinwave.typing import Floats
 FACTOR = re.compile(  # names of numbers that scale counts
     r"^(?!.*(vertical|horizontal|probe)).*(^|[ _.\[-])(scal(e|ing)|skalierung|fa[ck]tor|y?mult|cal|"
     r"calib(ration)?|sensitivity|empfindlichkeit|gain|lsb|slope|resolution|units?_?per_?\w+|"
-    r"per_(count|bit|lsb))($|[ _.(\[-])",
+    r"per_(count|bit|lsb))($|[ _.:=(\[-])",
     re.IGNORECASE,
 )
 LARGEST_VALUE = 1e100  # in SI; squares of larger values may overflow

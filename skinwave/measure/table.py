@@ -20,7 +20,6 @@ from skinwave.measure.headers import (
     X,
     Y,
     Z,
-    parse_heading,
 )
 from skinwave.measure.recording import Given, Recording, factors_in
 from skinwave.measure.units import (
@@ -53,6 +52,7 @@ _BAND = re.compile(r"(band[ _-]*|cent(er|re)[ _-]*)?(frequency|frequenz|fréquen
 _AXIS_UNIT = re.compile(r"(horizontal|x|time)[ _-]*units?")
 _UNIT = re.compile(r"(vertical|y)?[ _-]*(units?|einheit)")
 _DIRECTION = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
+_FORCE = re.compile(r"force|kraft|hammer|shaker|excit|anreg", re.IGNORECASE)
 _SIGNED = re.compile(r"([-+])([xyz])(?![a-z])|(?<![a-z])([xyz])([-+])(?!\w)", re.IGNORECASE)
 # Notes that tell what amplitudes are; averages of a spectrum do not.
 _SCALING = re.compile(
@@ -139,8 +139,11 @@ def _sign(columns: list[Column], given: Given) -> int:
     A force and a motion into the body are alike, so that it is the product of both signs. Returns 0
     if no heading names both.
     """
-    named = [_SIGNED.findall(column.text) for column in columns]
-    pairs = {tuple((a + d, (b + c).lower()) for a, b, c, d in each) for each in named}
+    axes = [_SIGNED.findall(column.text) for column in columns]
+    pairs = {tuple((a + d, (b + c).lower()) for a, b, c, d in each) for each in axes}
+    named = [column.text for column in columns if _FORCE.search(column.text)]
+    if named and any(len(pair) == 1 for pair in pairs) and not given.sign:
+        raise ValueError(f"'{named[0]}' names one direction, of motion or force; give --positive")
     both = {
         (pair[0][0] == pair[1][0], pair[0][1] == pair[1][1]) for pair in pairs if len(pair) == 2
     }
@@ -161,9 +164,11 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
     roles = {column.role for column in columns}
     for key, value in table.notes if FREQUENCY in roles else ():
         level = split_level(f"{key} {value}")[1]
-        if level and (not value or _SCALING.fullmatch(key)):
+        if not level or any(split_level(column.unit)[1] for column in columns):
+            continue
+        if not value or _SCALING.match(key):
             columns = [column.with_level(level) for column in columns]
-        elif level and not parse_heading(key).role:  # not the line of headings
+        else:
             remarks.append(
                 f"the file says '{key[:40]}: {value[:40]}'; values are taken as amplitudes, unless "
                 f'a unit such as --unit "mm/s {level}" is given'
@@ -208,7 +213,8 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
                 f"row {row} of '{column.text or k + 1}' is an overload; measure with a larger range"
             )
     if has_axis and chosen:  # tests beside each other may differ in length
-        numbers = numbers[~np.isnan(numbers).all(axis=1)]
+        own = [column.role != INDEX for column in columns]
+        numbers = numbers[~np.isnan(numbers[:, own]).all(axis=1)]
     return replace(table, columns=tuple(columns), numbers=numbers), remarks
 
 

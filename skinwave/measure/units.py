@@ -26,7 +26,7 @@ MOTION = {
         "g": 1 / STANDARD_GRAVITY, "mg": 1e3 / STANDARD_GRAVITY,
     },
 }  # fmt: skip
-REFERENCES = ("N", "mN", "kN", "V", "mV", "Pa", "kPa", "A", "mA")
+REFERENCES = ("N", "mN", "kN", "V", "mV", "Pa", "kPa", "A", "mA", "lbf")
 ANGLES = {"deg": 1.0, "rad": 1.0}
 _LETTERS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "°": "deg", "º": "deg"})
 # Spelled-out units of programs and languages, in lower case.
@@ -57,8 +57,8 @@ _WORDS = {
     PEAK: r"(?:0|zero|null)[ _-]*(?:to[ _-]*)?p(?:ea)?k?|p(?:ea)?k|scheitel|spitzen?",
 }
 _LEVELS = re.compile(
-    rf"[ _,]*[(\[]?(?<![a-z]{{2}})(?:{'|'.join(f'({words})' for words in _WORDS.values())})"
-    r"(?:wert|[ _-]value|[ _-]amplitude)?(?![a-z])\.?[)\]]?", re.IGNORECASE,
+    rf"[ _,]*([(\[])?(?<![a-z]{{2}})(?:{'|'.join(f'({words})' for words in _WORDS.values())})"
+    r"(?:wert|[ _-]value|[ _-]amplitude)?(?![a-z])\.?(?(1)[)\]])", re.IGNORECASE,
 )  # fmt: skip
 
 
@@ -68,10 +68,9 @@ def split_level(text: str) -> tuple[str, str]:
     >>> split_level("um pk-pk"), split_level("v_rms [mm/s]"), split_level("mm/s")
     (('um', 'peak-to-peak'), ('v [mm/s]', 'RMS'), ('mm/s', ''))
     """
-    found = next((match for match in _LEVELS.finditer(text) if match[match.lastindex or 0]), None)
-    if not found:
+    if not (found := _LEVELS.search(text)):
         return text, ""
-    level = tuple(_WORDS)[(found.lastindex or 1) - 1]
+    level = tuple(_WORDS)[(found.lastindex or 2) - 2]
     return f"{text[: found.start()]}{text[found.end() :]}".strip(" _-"), level
 
 

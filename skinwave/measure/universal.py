@@ -163,9 +163,9 @@ def _function(block: bytes) -> Function:
         kind, *ends = (int(at_by[k] or 0) for k in (0, 5, 6, 8, 9))
         form, count, is_even = (int(x or 0) for x in cells(8, 10, 10, 10))
         start, step = (float(x.upper().replace("D", "E") or 0) for x in cells(8, 30, 13, 13)[1:])
-        (abscissa, _, axis), (ordinate, label, unit), (_, _, per) = (
-            (int(one[0] or 0), *one[-2:]) for one in (cells(k, 10, 15, 21, 21) for k in (9, 10, 11))
-        )
+        abscissa, ordinate = (int(cells(k, 10)[0] or 0) for k in (9, 10))
+        axis, unit, per = (cells(k, 46, 21)[1] for k in (9, 10, 11))
+        label = cells(10, 25, 21)[1]
         values = _numbers(block[head.end() :], form, cells(1, 7, 6, 6))
     except ValueError as error:
         problem = str(error) if "export" in str(error) else "a set 58 has a damaged header or value"
@@ -178,7 +178,8 @@ def _function(block: bytes) -> Function:
     y = values[:count, -1] if form not in COMPLEX else values[:count, -2:] @ np.array([1, 1j])
     is_in_time = abscissa == TIME if abscissa in (TIME, FREQUENCY) else kind == IN_TIME
     known, dimension = (units.TIMES, "time") if is_in_time else (units.FREQUENCIES, "frequency")
-    unit, is_per_reference = units.per_reference(f"{unit}/{per}" if unit and per else unit)
+    alone, over = units.per_reference(unit), units.per_reference(f"{unit}/{per}")
+    unit, is_per_reference = over if over[1] > alone[1] else alone
     ids = [line.strip() for line in lines[2:7]]
     said = [label, *([] if is_in_time or kind == RESPONSE else ids)]
     level = next(filter(None, (units.split_level(text)[1] for text in [unit, *said])), "")
@@ -314,7 +315,8 @@ def _driving_points(motion: list[Function], given: Given, least: float = 0.1) ->
         moving = one.x > 0
         order = 1 - list(units.MOTION).index(quantity)
         mobility = one.y[moving] * (2j * np.pi * one.x[moving]) ** order
-        if one.at == one.by and mobility.real.sum() < -least * np.abs(mobility).sum():
+        is_driven = one.at[0] == one.by[0] and abs(one.at[1]) == abs(one.by[1])
+        if is_driven and mobility.real.sum() < -least * np.abs(mobility).sum():
             warned.append(f"the body gives energy to the excitation at node {one.at[0]}: its sign "
                           "or that of the phase is wrong; check --positive")  # fmt: skip
     return warned
