@@ -1,11 +1,10 @@
-"""Universal File Format 58, functions at nodal degrees of freedom, by pyuff.
+"""Universal File Format 58, functions at nodal degrees of freedom.
 
 Each set is a place; further sets of a node are repetitions. Coordinates are those of the sets 15 or
 2411 in the same file, lengths in the unit of set 164.
 """
 
 import re
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -107,40 +106,29 @@ def recording_of(
 
 def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], float]:
     """Return functions, coordinates by node, and the number of units of length per metre."""
-    try:
-        import pyuff
-    except ImportError:
-        raise ValueError('Universal Files need pyuff; pip install "skinwave[measure]"') from None
     with reading.open_regular(path, LARGEST) as file:
         content = file.read()
     tags = [match.start() for match in SET_TAG.finditer(content)]
     if len(tags) % 2:
         raise ValueError("the file ends within a set; export it again")
-    blocks = [content[k:end] for k, end in zip(tags[::2], tags[1::2], strict=True)]
-    types = [int(found[1]) if (found := SET_TYPE.match(block)) else 0 for block in blocks]
-    if FUNCTION not in types:
-        known = f", only {', '.join(map(str, sorted(set(types))))}" if types else ""
-        raise ValueError(f"the file has no set 58{known}; export functions")
+    functions, types, per_metre = [], set[int](), 1.0
     positions: dict[int, tuple[float, float]] = {}
-    per_metre = 1.0
-    for k, kind in enumerate(types):
-        if kind not in (*NODES, LENGTH_UNIT):
-            continue
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                one = pyuff.UFF(str(path)).read_sets(k)
-        except Exception:  # pyuff raises plain exceptions
-            raise ValueError(f"set {kind} cannot be read; export the functions alone") from None
-        if kind == LENGTH_UNIT:
-            length = float(one.get("length", 1.0))
-            per_metre = length if 0 < length < np.inf else 1.0
-        else:
-            rows = zip(one["node_nums"], one["x"], one["y"], strict=False)
-            positions |= {int(node): (float(x), float(y)) for node, x, y in rows}
-    functions = [
-        _function(block) for block, kind in zip(blocks, types, strict=True) if kind == FUNCTION
-    ]
+    for begin, end in zip(tags[::2], tags[1::2], strict=True):
+        block = content[begin:end]
+        kind = int(found[1]) if (found := SET_TYPE.match(block)) else 0
+        types.add(kind)
+        if kind == FUNCTION:
+            functions.append(_function(block))
+        elif kind in NODES:  # node, three integers, x, y, z
+            rows = _text_numbers(b" ".join(block.splitlines()[2:]))
+            rows = rows[: len(rows) // 7 * 7].reshape(-1, 7)
+            positions |= {int(node): (x, y) for node, *_, x, y, _ in rows.tolist()}
+        elif kind == LENGTH_UNIT:
+            length = _text_numbers(b" ".join(block.splitlines()[3:]))[:1]
+            per_metre = float(length[0]) if len(length) and 0 < length[0] < np.inf else 1.0
+    if not functions:
+        known = f", only {', '.join(map(str, sorted(types)))}" if types else ""
+        raise ValueError(f"the file has no set 58{known}; export functions")
     return functions, positions, per_metre
 
 
@@ -203,6 +191,11 @@ def _numbers(body: bytes, form: int, coding: list[str]) -> Floats:
         kind = ("<" if coding[1] == "1" else ">") + ("f4" if form in SINGLE else "f8")
         size = np.dtype(kind).itemsize
         return np.frombuffer(body[: len(body) // size * size], kind).astype(np.float64)
+    return _text_numbers(body)
+
+
+def _text_numbers(body: bytes) -> Floats:
+    """Return the numbers in a text, those of Fortran, too."""
     texts = (found.decode().upper().replace("D", "E") for found in NUMBER.findall(body))
     return np.array([float(SHORT.sub(r"\1E\2", text)) for text in texts])
 

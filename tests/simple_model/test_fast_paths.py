@@ -75,6 +75,18 @@ def test_the_kernel_has_the_lines_of_its_load_below_half_the_rate(load):
     assert misfit.max() < 1e-4
 
 
+def test_the_load_at_few_positions_is_transformed_instead_of_the_values():
+    """A chirp at a resting focus: both orders of a linear transform and a product agree."""
+    chirp = simple_model.Signal(rate=500.0, samples=tuple(np.sin(np.arange(50.0) ** 2 / 60)))
+    load = MovingPressure(tacton=Tacton(duration=0.1, signal=chirp))
+    values = np.random.default_rng(0).normal(size=(7, 3, len(path_samples(load))))
+    orders = np.array([-3, 0, 1, 40])
+    by_load, by_values = (path_fourier(load, values, orders, few=few) for few in (16, 0))
+    scale = np.abs(by_values).max()
+    assert by_load.shape == (7, 3, 4)
+    np.testing.assert_allclose(by_load, by_values, rtol=0, atol=1e-14 * scale)
+
+
 def lines_of(x):
     window = np.hanning(len(x))[:, None]
     return 2 * np.abs(np.fft.rfft(window * x, n=10_000, axis=0)) / window.sum()
