@@ -56,7 +56,7 @@ def read_npz(path: Path, given: Given) -> Recording:
     if str(arrays.get("format", "")) == FORMAT:
         return _own(arrays)
     if functions := sdynpy_functions(arrays):
-        return universal.recording_of(functions, given)
+        return universal.recording_of(given, functions)
     arrays = dict(_flat(arrays))
     if quantity := _response_quantity(arrays):
         kept = {name: arrays[name] for name in ("t", "probes", quantity)}
@@ -163,7 +163,9 @@ def recording_of(arrays: Arrays, given: Given) -> Recording:
             return np.transpose(array, (2, 1, 0))
         return _in_order(array, count, len(places), name, remarks)
 
-    moved, rate, start = ordered(values), _rate(short), _scalar(short, STARTS)
+    moved, start = ordered(values), _scalar(short, STARTS)
+    rate, interval = _scalar(short, RATES), _scalar(short, INTERVALS)
+    rate = rate if rate > 0 else 1 / interval if interval > 0 else np.nan
     if not (count or np.isnan(start + rate)):
         times = start + np.arange(moved.shape[1]) / rate
     elif not (count or is_zigzag):
@@ -318,11 +320,6 @@ def _scalar(arrays: Arrays, names: tuple[str, ...]) -> float:
         if array.dtype.kind in "fiu" and array.size == 1:
             return float(array.ravel()[0])
     return float("nan")
-
-
-def _rate(arrays: Arrays) -> float:
-    rate, interval = _scalar(arrays, RATES), _scalar(arrays, INTERVALS)
-    return rate if rate > 0 else 1 / interval if interval > 0 else np.nan
 
 
 def _places(arrays: Arrays) -> Floats:

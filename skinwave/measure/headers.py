@@ -10,18 +10,8 @@ import unicodedata
 from dataclasses import dataclass, replace
 
 from simple_model.quantities import QUANTITIES
-from skinwave.measure.units import (
-    ANGLES,
-    FREQUENCIES,
-    LENGTHS,
-    MOTION,
-    TIMES,
-    canonical,
-    metres,
-    per_reference,
-    quantity_of,
-    split_level,
-)
+from skinwave.measure import units
+from skinwave.measure.units import ANGLES, LENGTHS, MOTION, TIMES, canonical, quantity_of
 
 TIME, FREQUENCY, X, Y, Z = "time", "frequency", "x", "y", "z"
 REPETITION, DRIVE, INDEX = "repetition", "drive", "index"
@@ -60,7 +50,7 @@ _HEADING = re.compile(
     r"(?:\((?P<place>[^()a-zA-Z]*,[^()]*)\))?\s*(?:\#(?P<repetition>\d{1,9}))?\s*"
     r"(?:\[(?P<unit>[^\]]*)\]|\((?P<round>(?:[^(),]|\([^()]*\))*)\))?"
 )
-UNITS = {unit for units in (TIMES, FREQUENCIES, *MOTION.values(), ANGLES) for unit in units}
+UNITS = {unit for known in (TIMES, units.FREQUENCIES, *MOTION.values(), ANGLES) for unit in known}
 _SUFFIXES = {unit.replace("/", "_"): unit for unit in UNITS - {"in"}}  # as in "signal_in"
 UNITS |= {canonical(unit) for unit in UNITS} | {
     "V", "mV", "uV", "N", "mN", "Pa", "kPa", "A", "mA", "%", "EU", "a.u.", COUNT_UNIT, "dB", "",
@@ -92,15 +82,17 @@ class Column:
 
     def with_level(self, level: str) -> "Column":
         """Return the column with a level in its unit, such as "mm/s RMS", if it may have one."""
-        is_level = self.may_be_motion and self.part != "phase" and not split_level(self.unit)[1]
-        is_level &= bool(quantity_of(per_reference(self.unit)[0]) or not self.unit)
+        is_level = (
+            self.may_be_motion and self.part != "phase" and not units.split_level(self.unit)[1]
+        )
+        is_level &= bool(quantity_of(units.per_reference(self.unit)[0]) or not self.unit)
         return replace(self, unit=f"{self.unit} {level}".strip()) if level and is_level else self
 
 
 def parse_heading(text: str, unit: str = "") -> Column:
     """Return the column with this heading, and with the unit below it, if any."""
     text = " ".join(unicodedata.normalize("NFKC", text).split())
-    (heading, level), (unit, below) = split_level(text), split_level(unit)
+    (heading, level), (unit, below) = units.split_level(text), units.split_level(unit)
     split = re.fullmatch(r"(.+?)(?:\s+/\s*|\s*/\s+|,\s+|\s+in\s+)(\S+)", heading)
     if split and canonical(split[2]) in UNITS:
         heading = f"{split[1]} [{split[2]}]"
@@ -136,7 +128,7 @@ def _role(name: str, unit: str) -> str:
         role = TIME
     if known_unit in TIMES:
         return TIME
-    if known_unit in FREQUENCIES:
+    if known_unit in units.FREQUENCIES:
         return FREQUENCY
     if known_unit == COUNT_UNIT:
         return INDEX
@@ -167,4 +159,4 @@ def _place(text: str) -> tuple[float, float]:
     pair = coordinates.split(",")
     if len(pair) != 2:
         raise ValueError(f"the place ({text[:40]}) of a column is not a pair x,y; write (5,0)")
-    return metres(pair[0], unit), metres(pair[1], unit)
+    return units.metres(pair[0], unit), units.metres(pair[1], unit)

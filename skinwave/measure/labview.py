@@ -95,7 +95,8 @@ def read_tdms(path: Path, given: Given) -> Recording:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            channels = [one for group in TdmsFile.read(path).groups() for one in group.channels()]
+            file = TdmsFile.read(path)
+            channels = [one for group in file.groups() for one in group.channels()]
             data = [np.asarray(channel[:]) for channel in channels]
     except Exception:  # whatever the library raises for damaged bytes
         raise ValueError("the file is damaged or not a TDMS file; export it again") from None
@@ -112,7 +113,8 @@ def read_tdms(path: Path, given: Given) -> Recording:
         column = parse_heading(f"{name} [{unit}]" if unit else name)
         clock = _clock(own.get("wf_increment", 0), own.get("wf_start_offset", 0),
                        own.get("wf_start_time", ""))  # fmt: skip
-        given_by = {key: x for key, x in own.items() if not key.startswith("NI_")}
+        above = {**file.properties, **file[channel.group_name].properties, **own}
+        given_by = {key: x for key, x in above.items() if not key.startswith("NI_")}
         signals.append((column, values, clock, given_by))
     if not signals:
         raise ValueError("no channel of the TDMS file has numbers; save the signals as numbers")

@@ -16,8 +16,8 @@ from skinwave.typing import Floats
 
 FACTOR = re.compile(  # names of numbers that scale counts
     r"^(?!.*(vertical|horizontal|probe)).*(^|[ _.\[-])(scal(e|ing)|skalierung|fa[ck]tor|y?mult|cal|"
-    r"calib(ration)?|sensitivity|empfindlichkeit|gain|lsb|slope|resolution|units?_?per_?\w+|"
-    r"per_(count|bit|lsb))($|[ _.:=(\[-])",
+    r"calib(ration)?|sensitivity|empfindlichkeit|gain|lsb|slope|resolution|full_?scale|range|"
+    r"counts?_per_\w+|units?_?per_?\w+|per_(count|bit|lsb))($|[ _.:=(\[-])",
     re.IGNORECASE,
 )
 LARGEST_VALUE = 1e100  # in SI; squares of larger values may overflow
@@ -144,16 +144,23 @@ def _check_counts(recording: Recording, given: Given, unit: str, remarks: list[s
         text = f"'{name[:40]}' = {factor:g}"
         values = recording.values[~np.isnan(recording.values)]
         if (values == np.rint(values.real)).all():
+            is_motion = re.search(
+                r"(?<!full_)(?<!full)scal|fa[ck]tor|mult|cal|lsb|slope|(?<!counts)_per", name, re.I
+            )
+            unit = f"{factor:g} {unit}" if is_motion else f"0.01 {unit}"
             raise ValueError(
                 f"values are whole numbers, and {text} seems to be their factor; give the motion "
-                f'that 1 stands for, such as --unit "{factor:g} {unit}"'
+                f'that 1 stands for, such as --unit "{unit}"'
             )
         remarks.append(f"{text} is not applied; if values lack it, give a --unit that contains it")
 
 
 def factors_in(texts: Mapping[str, object]) -> dict[str, float]:
     """Return the numbers other than 1 whose names say that they scale values."""
-    found = {name: number_in(str(value)) for name, value in texts.items() if FACTOR.match(name)}
+    named = {name: str(value) for name, value in texts.items() if FACTOR.match(name)}
+    found = {
+        name: number_in(text.split(" ")[0]) for name, text in named.items() if "dB" not in text
+    }
     return {name: x for name, x in found.items() if x not in (None, 0.0, 1.0)}
 
 

@@ -10,35 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skinwave.measure.headers import (
-    DRIVE,
-    FREQUENCY,
-    INDEX,
-    REPETITION,
-    TIME,
-    Column,
-    X,
-    Y,
-    Z,
-)
+from skinwave.measure import units
+from skinwave.measure.headers import DRIVE, FREQUENCY, INDEX, REPETITION, TIME, Column, X, Y, Z
 from skinwave.measure.recording import Given, Recording, factors_in
-from skinwave.measure.units import (
-    FREQUENCIES,
-    LENGTHS,
-    TIMES,
-    canonical,
-    check_linear,
-    divisor,
-    in_si,
-    per_reference,
-    quantity_of,
-    split_level,
-)
+from skinwave.measure.units import FREQUENCIES, LENGTHS, TIMES, canonical, quantity_of
 from skinwave.typing import Floats
 
 EXAMPLE = "t [s], v(0,0) [mm/s], v(5,0) [mm/s]"
 LONG_EXAMPLE = "t [s], x [mm], y [mm], v [mm/s]"
-DRIVE_UNITS = ("V", "mV", "N", "mN", "Pa", "kPa", "A", "mA")
 SIGNS = {"into the body": 1, "out of the body": -1}
 UNEVENNESS = 1e-2  # of the range: largest distance of rounded times from a straight line
 FEWEST_ROWS = 4  # that show whether a column rises
@@ -80,16 +59,16 @@ class Table:
         """Return the first value of a note, or ""."""
         return next((value for name, value in self.notes if key.fullmatch(name) and value), "")
 
-    def number(self, key: re.Pattern[str], units: dict[str, float]) -> float:
+    def number(self, key: re.Pattern[str], known: dict[str, float]) -> float:
         """Return the number of a note in SI, or nan."""
         match = re.fullmatch(r"\D*?([-+.\deE,]+)\s*([^\d\s].*)?", self.note(key))
         if not match:
             return float("nan")
         unit = re.sub(r"^(k?)Sa?/s$", r"\1Hz", canonical(match[2] or ""))
-        if not unit and units is TIMES:
+        if not unit and known is TIMES:
             unit = canonical(self.note(_AXIS_UNIT))
         try:
-            return float(match[1].replace(",", ".")) / units[unit or next(iter(units))]
+            return float(match[1].replace(",", ".")) / known[unit or next(iter(known))]
         except (KeyError, ValueError):
             return float("nan")
 
@@ -139,32 +118,34 @@ def _sign(columns: list[Column], given: Given) -> int:
     A force and a motion into the body are alike, so that it is the product of both signs. Returns 0
     if no heading names both.
     """
-    axes = [_SIGNED.findall(column.text) for column in columns]
-    pairs = {tuple((a + d, (b + c).lower()) for a, b, c, d in each) for each in axes}
-    named = [column.text for column in columns if _FORCE.search(column.text)]
-    if named and any(len(pair) == 1 for pair in pairs) and not given.sign:
-        raise ValueError(f"'{named[0]}' names one direction, of motion or force; give --positive")
-    both = {
-        (pair[0][0] == pair[1][0], pair[0][1] == pair[1][1]) for pair in pairs if len(pair) == 2
-    }
-    if both and both not in ({(True, True)}, {(False, True)}) and not given.sign:
+    signs = set()
+    for column in columns:
+        found = [(a + d, (b + c).lower()) for a, b, c, d in _SIGNED.findall(column.text)]
+        if len(found) == 1 and _FORCE.search(column.text):
+            found *= 1 if given.sign else 3  # the direction of the other is unknown
+        if len(found) > 1:
+            (sign, axis), (other, along) = found[:2]
+            signs.add((1 if sign == other else -1) * (axis == along and len(found) == 2))
+    if signs and (len(signs) > 1 or 0 in signs) and not given.sign:
         raise ValueError(
-            "motion and excitation differ in axis, or their signs from column to column; choose "
-            "others with --columns, or give --positive"
+            "headings name different axes or signs of motion and excitation, or one of them; "
+            "choose others with --columns, or give --positive"
         )
-    return (1 if (True, True) in both else -1) if both else 0
+    return signs.pop() if signs else 0
 
 
 def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
     """Return the table of relevant columns, with roles inferred from their numbers, and remarks."""
     numbers, remarks = _rows(table), []
-    columns = [replace(column, unit=per_reference(column.unit)[0]) for column in table.columns]
-    if any(per_reference(column.unit)[1] for column in table.columns):
+    columns = [
+        replace(column, unit=units.per_reference(column.unit)[0]) for column in table.columns
+    ]
+    if any(units.per_reference(column.unit)[1] for column in table.columns):
         remarks.append("values are per unit of the reference")
     roles = {column.role for column in columns}
     for key, value in table.notes if FREQUENCY in roles else ():
-        level = split_level(f"{key} {value}")[1]
-        if not level or any(split_level(column.unit)[1] for column in columns):
+        level = units.split_level(f"{key} {value}")[1]
+        if not level or any(units.split_level(column.unit)[1] for column in columns):
             continue
         if not value or _SCALING.match(key):
             columns = [column.with_level(level) for column in columns]
@@ -289,7 +270,7 @@ def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int
     bare = [k for k in motion if k not in known and np.isnan(columns[k].place[0])]
     names = ", ".join(columns[k].text or str(k + 1) for k in bare)
     if len(bare) == len(motion) > 1 and given.places is None:
-        if all(canonical(columns[k].unit) in DRIVE_UNITS for k in bare):
+        if all(canonical(columns[k].unit) in units.REFERENCES for k in bare):
             unit = columns[bare[0]].unit
             raise ValueError(
                 f"columns {names} are in {unit}; choose with --columns, or give --places"
@@ -299,7 +280,7 @@ def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int
         return list(range(len(columns)))
     left_out = [k for k in motion if k not in known and columns[k].unit
                 and columns[k].part != "phase"]  # fmt: skip
-    drives = [k for k in left_out if canonical(columns[k].unit) in DRIVE_UNITS]
+    drives = [k for k in left_out if canonical(columns[k].unit) in units.REFERENCES]
     if len(drives) == 1 and not any(column.role == DRIVE for column in columns):
         k = drives[0]
         columns[k] = replace(columns[k], role=DRIVE)
@@ -337,8 +318,8 @@ def _axis(table: Table, at: int, given: Given, is_long: bool) -> tuple[Floats, F
         cure = "write 't [s]', or give --rate" if is_time else "write 'f [Hz]'"
         raise ValueError(f"the column '{column.text or at + 1}' has no unit; {cure}")
     if is_time:
-        return in_si(values, divisor(column.unit, TIMES, "time")), empty
-    return empty, in_si(values, divisor(column.unit, FREQUENCIES, "frequency"))
+        return units.in_si(values, units.divisor(column.unit, TIMES, "time")), empty
+    return empty, units.in_si(values, units.divisor(column.unit, FREQUENCIES, "frequency"))
 
 
 Series = list[tuple[Column, np.ndarray]]
@@ -348,7 +329,7 @@ def _series(table: Table, motion: list[int], is_complex: bool) -> Series:
     """Return columns of motion with their values, two columns for each complex amplitude."""
     columns = table.columns
     for k in motion:
-        check_linear(columns[k].unit, columns[k].text)
+        units.check_linear(columns[k].unit, columns[k].text)
     if not is_complex:
         if parts := [columns[k].text for k in motion if columns[k].part]:
             raise ValueError(f"the column '{parts[0]}' is of a spectrum; add the column 'f [Hz]'")
@@ -417,7 +398,8 @@ def coordinates(table: Table) -> Floats:
         if not table.columns[k].unit:
             raise ValueError(f"the column '{table.columns[k].text}' has no unit; write 'x [mm]'")
     return np.column_stack([
-        in_si(table.numbers[:, k], divisor(table.columns[k].unit, LENGTHS, "length")) for k in at
+        units.in_si(table.numbers[:, k], units.divisor(table.columns[k].unit, LENGTHS, "length"))
+        for k in at
     ])  # fmt: skip
 
 

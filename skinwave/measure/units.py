@@ -44,14 +44,17 @@ _SPELLINGS = {
     for word in words.split()
 }  # fmt: skip
 _FACTOR = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(.*)", re.IGNORECASE)
-_DECIBEL = re.compile(r"\s*dB.*|.*\(dB\)", re.IGNORECASE)
-_POWER_WORD = re.compile(r"\b[paec]sd\b|power|density|leistung|dichte|autospe", re.IGNORECASE)
+_DECIBEL = re.compile(r"\s*dB", re.IGNORECASE)
+_POWER_WORD = re.compile(
+    r"\b[paec]sd\b|power|density|leistung|dichte|autospe|(?<!root )mean square", re.IGNORECASE
+)
 _POWER_UNIT = re.compile(r"hz|m\^?[24]/s|[mg)]\^?[24]$", re.IGNORECASE)
 RMS, PEAK_TO_PEAK, PEAK = "RMS", "peak-to-peak", "peak"
 AMPLITUDES = {RMS: 2**0.5, PEAK_TO_PEAK: 0.5, PEAK: 1.0, "": 1.0}  # of a sinusoid of level 1
 _TOP = r"(?:p(?:ea)?k?|spitzen?|cr[êe]te)"
 _WORDS = {
     PEAK_TO_PEAK: rf"{_TOP}[ _-]*(?:to|zu|bis|à|2)?[ _-]*{_TOP}|spitze[ -]*tal|double amplitude|"
+    r"(?<=[ _(\[])s-?s|"
     "doppelamplitude|schwing(?:breite|weite)",
     RMS: r"r\.?m\.?s\.?|root[ -]mean[ -]squared?|eff(?:ektiv|icace)?",
     PEAK: r"(?:0|zero|null)[ _-]*(?:to[ _-]*)?p(?:ea)?k?|p(?:ea)?k|scheitel|spitzen?",
@@ -76,9 +79,8 @@ def split_level(text: str) -> tuple[str, str]:
 
 def check_linear(unit: str, text: str = "") -> None:
     """Raise a ValueError for a unit or heading of a level in dB, or of a power density."""
-    for one in (unit, text):
-        if _DECIBEL.match(one):
-            raise ValueError(f"'{one[:40]}' is a level in dB, not a unit; export linear values")
+    if _DECIBEL.match(unit):
+        raise ValueError(f"'{unit[:40]}' is a level in dB, not a unit; export linear values")
     if _POWER_UNIT.search(canonical(unit)) or _POWER_WORD.search(text):
         raise ValueError(
             f"'{(text or unit)[:40]}' is a power or a density and has no phase; export waveforms "

@@ -23,6 +23,7 @@ QUANTITIES = {8: "displacement", 11: "velocity", 12: "acceleration"}
 SI = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
 GENERAL, IN_TIME, RESPONSE, SPECTRUM = 0, 1, 4, 12  # types of functions that have a phase
 SINGLE, COMPLEX = (2, 5), (5, 6)  # types of values
+ROW = 6  # values of a line of text, which may be filled up
 TIME, FREQUENCY = 17, 18  # types of abscissas
 SET_TAG = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")  # line before and after each set
 SET_TYPE = re.compile(rb"[^\r\n]*[\r\n]+ *(\d+)")
@@ -55,13 +56,12 @@ class Function:
 
 def read(path: Path, given: Given) -> Recording:
     """Return the recording in a Universal File."""
-    functions, positions, per_metre = _sets(path)
-    return recording_of(functions, given, positions, per_metre)
+    return recording_of(given, *_sets(path))
 
 
 def recording_of(
-    functions: list[Function],
     given: Given,
+    functions: list[Function],
     positions: Mapping[int, tuple[float, float]] | None = None,
     per_metre: float = 1.0,
 ) -> Recording:
@@ -141,9 +141,7 @@ def _function(block: bytes) -> Function:
 
     def cells(line: int, *widths: int) -> list[str]:
         ends = np.cumsum(widths)
-        each = [
-            lines[line][end - width : end].strip() for end, width in zip(ends, widths, strict=True)
-        ]
+        each = (lines[line][end - n : end].strip() for end, n in zip(ends, widths, strict=True))
         return ["" if cell.upper() == "NONE" else cell for cell in each]
 
     try:
@@ -160,7 +158,8 @@ def _function(block: bytes) -> Function:
         raise ValueError(f"{problem.partition('; ')[0]}; export it again as text") from None
     parts = 1 + (form in COMPLEX) + (not is_even)
     values = values[: len(values) // parts * parts].reshape(-1, parts)
-    if count < 2 or len(values) < count:
+    is_text = "b" not in lines[1].lower()  # line ends may follow binary values
+    if count < 2 or len(values) < count or (is_text and len(values) > count + ROW):
         raise ValueError(f"a set 58 has {len(values)} of {count} values; export it again")
     x = start + step * np.arange(count) if is_even else values[:count, 0]
     y = values[:count, -1] if form not in COMPLEX else values[:count, -2:] @ np.array([1, 1j])
@@ -208,18 +207,15 @@ def _motion(functions: list[Function], given: Given) -> tuple[list[Function], li
             f"functions of type {functions[0].type} are no waveforms, spectra or frequency "
             "responses; export these"
         )
-    motion = [one for one in with_phase if not one.is_reference]
-    quantities = {one.quantity for one in motion} - {""}
-    if quantities:
-        wanted = {given.quantity} if given.quantity in quantities else quantities
+    motion = [f for f in with_phase if not f.is_reference and (f.quantity or not f.is_other)]
+    others = [f for f in with_phase if f.is_reference or not f.quantity]
+    if quantities := {one.quantity for one in motion} - {""}:
+        wanted = {given.quantity} & quantities or quantities
+        motion = [one for one in motion if one.quantity in wanted]
+    elif given.unit or given.quantity:
+        others = [one for one in others if one not in motion]
     else:
-        wanted = {""} if given.unit or given.quantity else set()
-    motion = [
-        one for one in motion if one.quantity in wanted and (one.quantity or not one.is_other)
-    ]
-    others = [
-        one for one in with_phase if one not in motion and (one.is_reference or not one.quantity)
-    ]
+        motion = []
     if not motion:
         raise ValueError(
             "the functions are no displacement, velocity or acceleration; export motion"
@@ -235,12 +231,10 @@ def _motion(functions: list[Function], given: Given) -> tuple[list[Function], li
     along = [one for one in along if abs(one.by[1]) in (0, AXES[direction])] or along
     excited = {(abs(one.by[1]), one.by[0]) for one in along}
     if len(excited) > 1:
-        is_one_axis = len({axis for axis, _ in excited}) == 1
-        each = ", ".join(
-            f"{node}" if is_one_axis else f"{node} {names.get(axis, 'rotation')}"
-            for axis, node in sorted(excited)
-        )
-        raise ValueError(f"responses have the references {each}; export one")
+        one_axis = len({axis for axis, _ in excited}) == 1
+        each = [f"{node} {names.get(axis, '')}"[: len(str(node)) if one_axis else None].strip()
+                for axis, node in sorted(excited)]  # fmt: skip
+        raise ValueError(f"responses have the references {', '.join(each)}; export one")
     return along, others
 
 
@@ -281,22 +275,20 @@ def _along_axis(motion: list[Function], given: Given) -> tuple[list[Function], i
     It is -1 for z, and 0 for other axes. A frequency response whose excitation has a direction is
     that along the positive axis of both, which is also that of both into the body: 1.
     """
-    at, by = (
-        {one[1] for one in pairs} for pairs in zip(*((f.at, f.by) for f in motion), strict=True)
-    )
+    at, by = ({abs(one[1]) for one in each} for each in ([f.at for f in motion],
+                                                         [f.by for f in motion]))  # fmt: skip
     if any(0 in both and any(both) for both in (at, by)):
         raise ValueError("only some sets 58 have a direction; export one kind")
     if not any(at):
         return motion, 0
-    axis, excited = (abs(next(iter(both))) for both in (at, by))
+    axis, excited = at.pop(), by.pop()
     if excited not in (0, axis) and not given.sign:
         raise ValueError(
             "motion and excitation are along different axes, which gives no sign; export responses "
             "to a force along the motion, or give --positive"
         )
-    turned = [
-        replace(one, y=np.sign(one.at[1]) * (np.sign(one.by[1]) or 1) * one.y) for one in motion
-    ]
+    signs = [np.sign(one.at[1]) * (np.sign(one.by[1]) or 1) for one in motion]
+    turned = [replace(one, y=sign * one.y) for one, sign in zip(motion, signs, strict=True)]
     return turned, 1 if excited else -(axis == AXES["z"])
 
 
