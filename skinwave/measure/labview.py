@@ -65,10 +65,8 @@ def _simultaneous(channels: list[Channel], given: Given) -> Recording:
     wanted = {clocks[k] for k in of_motion} - {()}
     if len(lengths) > 1 or len(wanted) > 1:
         each = ", ".join(f"{column.text[:20]} {len(x):,}" for column, x, *_ in channels)
-        raise ValueError(
-            f"channels differ in length, step or start ({each[:120]}); choose simultaneous ones "
-            "with --columns"
-        )
+        problem = f"channels differ in length, step or start ({each[:120]})"
+        raise ValueError(f"{problem}; choose simultaneous ones with --columns")
     kept = [k for k, clock in enumerate(clocks) if len(channels[k][1]) in lengths
             and (not clock or not wanted or clock in wanted)]  # fmt: skip
     columns, series, *_ = zip(*(channels[k] for k in kept), strict=True)
@@ -87,9 +85,8 @@ def read_tdms(path: Path, given: Given) -> Recording:
     try:
         from nptdms import TdmsFile
     except ImportError:
-        raise ValueError(
-            'TDMS files need npTDMS; pip install "skinwave[measure]", or export .lvm or .csv'
-        ) from None
+        cure = 'pip install "skinwave[measure]", or export .lvm or .csv'
+        raise ValueError(f"TDMS files need npTDMS; {cure}") from None
     with reading.open_regular(path, LARGEST):
         pass
     try:

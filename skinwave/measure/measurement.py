@@ -55,9 +55,7 @@ class Measurement:
 
     def __post_init__(self) -> None:
         if not quantity(self.quantity).of_body:
-            raise ValueError(
-                f"the quantity of a measurement cannot be {self.quantity}; give a motion"
-            )
+            raise ValueError(f"a measurement cannot be of {self.quantity}; give a motion")
         kind = np.complex128 if len(self.frequencies) else np.float64
         for name in ("places", "times", "frequencies", "values", "drive"):
             dtype = kind if name in ("values", "drive") else np.float64

@@ -56,10 +56,8 @@ def read_wav(path: Path, given: Given) -> Recording:
     said = comment[1][:80].decode("latin-1").strip() if comment else ""
     notes.append(("remark", said and f"comment in the file: {said}"))
     if FACTOR.match(said) and full > 1 and not re.match(r"[\d.]", given.unit):
-        raise ValueError(
-            f"the comment '{said}' seems to give the motion of a count; give that of full scale, "
-            f'{full:,.0f} counts, such as --unit "20 mm/s"'
-        )
+        cure = f'give that of full scale, {full:,.0f} counts: --unit "20 mm/s"'
+        raise ValueError(f"the comment '{said}' seems to give the motion of a count; {cure}")
     return recording_of(Table(columns=columns, numbers=values, notes=tuple(notes)), given)
 
 

@@ -20,6 +20,7 @@ FACTOR = re.compile(  # names of numbers that scale counts
     r"counts?_per_\w+|units?_?per_?\w+|per_(count|bit|lsb))($|[ _.:=(\[-])",
     re.IGNORECASE,
 )
+OF_COUNT = re.compile(r"(?<!full.)scal|fa[ck]tor|mult|cal|lsb|slope|(?<!counts)_per", re.IGNORECASE)
 LARGEST_VALUE = 1e100  # in SI; squares of larger values may overflow
 LOWEST_RATE = 40.0  # Hz; half of it is below all vibrations that are felt
 EXAMPLE = "--quantity velocity --unit mm/s"
@@ -129,10 +130,8 @@ def _amplitude(recording: Recording, given: Given, remarks: list[str]) -> float:
         return factor
     is_level = np.isrealobj(recording.values) and np.nanmin(recording.values, initial=0.0) >= 0
     if level in (units.RMS, units.PEAK_TO_PEAK) or (level and is_level and not given.unit):
-        raise ValueError(
-            f"{level} values over time are a level, not a waveform. Export the waveform; if this "
-            'is one, give its unit as, for example, --unit "mm/s peak"'
-        )
+        cure = 'export the waveform or, if it is one, give a unit such as --unit "mm/s peak"'
+        raise ValueError(f"{level} values over time are a level, not a waveform; {cure}")
     return 1.0
 
 
@@ -144,24 +143,17 @@ def _check_counts(recording: Recording, given: Given, unit: str, remarks: list[s
         text = f"'{name[:40]}' = {factor:g}"
         values = recording.values[~np.isnan(recording.values)]
         if (values == np.rint(values.real)).all():
-            is_motion = re.search(
-                r"(?<!full_)(?<!full)scal|fa[ck]tor|mult|cal|lsb|slope|(?<!counts)_per", name, re.I
-            )
-            unit = f"{factor:g} {unit}" if is_motion else f"0.01 {unit}"
-            raise ValueError(
-                f"values are whole numbers, and {text} seems to be their factor; give the motion "
-                f'that 1 stands for, such as --unit "{unit}"'
-            )
+            number = factor if OF_COUNT.search(name) else 0.01
+            cure = f'give the motion of 1, such as --unit "{number:g} {unit}"'
+            raise ValueError(f"{text} seems to be the factor of whole numbers; {cure}")
         remarks.append(f"{text} is not applied; if values lack it, give a --unit that contains it")
 
 
 def factors_in(texts: Mapping[str, object]) -> dict[str, float]:
     """Return the numbers other than 1 whose names say that they scale values."""
     named = {name: str(value) for name, value in texts.items() if FACTOR.match(name)}
-    found = {
-        name: number_in(text.split(" ")[0]) for name, text in named.items() if "dB" not in text
-    }
-    return {name: x for name, x in found.items() if x not in (None, 0.0, 1.0)}
+    found = {name: number_in(f"{text} ".split(" ")[0]) for name, text in named.items()}
+    return {n: x for n, x in found.items() if x not in (None, 0.0, 1.0) and "dB" not in named[n]}
 
 
 def _quantity(recording: Recording, given: Given) -> tuple[str, str]:
@@ -175,7 +167,7 @@ def _quantity(recording: Recording, given: Given) -> tuple[str, str]:
         known = QUANTITIES.get(quantity)
         usual = units.canonical(known.shown) if known and quantity in units.MOTION else "UNIT"
         raise ValueError(f"the file gives no unit; give --unit {usual}")
-    if not given.unit and not quantity and "dB" not in unit:
+    if not given.unit and not quantity:
         raise ValueError(f'give the motion that 1 {unit[:40]} stands for: --unit "20 mm/s"')
     if not quantity:
         units.motion_divisor(unit, "displacement")  # whose error names what is wrong
@@ -340,8 +332,6 @@ def _fill(row: Floats, gap: np.ndarray) -> float:
         error = float(np.sqrt(np.mean(np.square(away)))) / size if size > 0 else 0.0
     if not error <= LARGEST_GAP_ERROR:
         missing = f"{int(gap.sum())} samples are missing, up to {longest} in a row"
-        raise ValueError(
-            f"{missing}, too many to interpolate; choose other --columns, or cut the rows"
-        )
+        raise ValueError(f"{missing}, too many to interpolate; choose --columns, or cut the rows")
     row[gap] = CubicSpline(known, row[known])(np.flatnonzero(gap))
     return error

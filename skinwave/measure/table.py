@@ -127,10 +127,8 @@ def _sign(columns: list[Column], given: Given) -> int:
             (sign, axis), (other, along) = found[:2]
             signs.add((1 if sign == other else -1) * (axis == along and len(found) == 2))
     if signs and (len(signs) > 1 or 0 in signs) and not given.sign:
-        raise ValueError(
-            "headings name different axes or signs of motion and excitation, or one of them; "
-            "choose others with --columns, or give --positive"
-        )
+        problem = "headings name different axes of motion and excitation, or only one of them"
+        raise ValueError(f"{problem}; choose others with --columns, or give --positive")
     return signs.pop() if signs else 0
 
 
@@ -187,12 +185,9 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
             columns[k] = replace(column, unit=unit)
     numbers = numbers[:, kept]
     columns = [columns[k] for k in kept]
-    for k, column in enumerate(columns):
-        if np.isinf(numbers[:, k]).any():
-            row = int(np.isinf(numbers[:, k]).argmax()) + 1
-            raise ValueError(
-                f"row {row} of '{column.text or k + 1}' is an overload; measure with a larger range"
-            )
+    for row, k in np.argwhere(np.isinf(numbers))[:1]:
+        name = f"row {row + 1} of column '{columns[k].text or k + 1}'"
+        raise ValueError(f"{name} is an overload; measure with a larger range")
     if has_axis and chosen:  # tests beside each other may differ in length
         own = [column.role != INDEX for column in columns]
         numbers = numbers[~np.isnan(numbers[:, own]).all(axis=1)]
@@ -272,9 +267,7 @@ def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int
     if len(bare) == len(motion) > 1 and given.places is None:
         if all(canonical(columns[k].unit) in units.REFERENCES for k in bare):
             unit = columns[bare[0]].unit
-            raise ValueError(
-                f"columns {names} are in {unit}; choose with --columns, or give --places"
-            )
+            raise ValueError(f"columns {names} are in {unit}; give --columns or --places")
         remarks.append(f"columns {names} are taken as places; if one is the drive, give --columns")
     if not known:
         return list(range(len(columns)))
@@ -336,10 +329,8 @@ def _series(table: Table, motion: list[int], is_complex: bool) -> Series:
         return [(columns[k], table.numbers[:, k]) for k in motion]
     if len(motion) % 2:
         names = ", ".join(columns[k].text or str(k + 1) for k in motion)[:80]
-        raise ValueError(
-            f"a spectrum needs two columns per place, re and im, or abs and phase, not {names}; "
-            "choose with --columns"
-        )
+        problem = f"{names} are not two columns per place, re and im, or abs and phase"
+        raise ValueError(f"{problem}; choose others with --columns")
     pairs = zip(motion[::2], motion[1::2], strict=True)
     return [(columns[k], _complex(table, k, other)) for k, other in pairs]
 

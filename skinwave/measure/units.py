@@ -82,10 +82,8 @@ def check_linear(unit: str, text: str = "") -> None:
     if _DECIBEL.match(unit):
         raise ValueError(f"'{unit[:40]}' is a level in dB, not a unit; export linear values")
     if _POWER_UNIT.search(canonical(unit)) or _POWER_WORD.search(text):
-        raise ValueError(
-            f"'{(text or unit)[:40]}' is a power or a density and has no phase; export waveforms "
-            "or complex amplitudes"
-        )
+        cure = "export waveforms or complex amplitudes"
+        raise ValueError(f"'{(text or unit)[:40]}' is a density or power without phase; {cure}")
 
 
 def canonical(unit: str) -> str:

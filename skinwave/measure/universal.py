@@ -203,10 +203,8 @@ def _motion(functions: list[Function], given: Given) -> tuple[list[Function], li
     """Return functions of motion along the direction, with phase, and all others."""
     with_phase = [f for f in functions if f.type in (GENERAL, IN_TIME, RESPONSE, SPECTRUM)]
     if not with_phase:
-        raise ValueError(
-            f"functions of type {functions[0].type} are no waveforms, spectra or frequency "
-            "responses; export these"
-        )
+        cure = "export waveforms, spectra or frequency responses"
+        raise ValueError(f"functions of type {functions[0].type} are not supported; {cure}")
     motion = [f for f in with_phase if not f.is_reference and (f.quantity or not f.is_other)]
     others = [f for f in with_phase if f.is_reference or not f.quantity]
     if quantities := {one.quantity for one in motion} - {""}:
@@ -217,11 +215,9 @@ def _motion(functions: list[Function], given: Given) -> tuple[list[Function], li
     else:
         motion = []
     if not motion:
-        raise ValueError(
-            "the functions are no displacement, velocity or acceleration; export motion"
-            if all(one.is_other for one in with_phase)
-            else 'no function has a unit of motion; give --unit, such as "20 mm/s"'
-        )
+        if all(one.is_other for one in with_phase):
+            raise ValueError("no function is displacement, velocity or acceleration; export motion")
+        raise ValueError('no function has a unit of motion; give --unit, such as "20 mm/s"')
     direction = given.direction or "z"
     along = [one for one in motion if abs(one.at[1]) in (0, AXES[direction])]
     names = {number: name for name, number in AXES.items()}
@@ -244,14 +240,13 @@ def _check_alike(motion: list[Function]) -> None:
     step = 1e-3 * abs(first.x[1] - first.x[0])
     for one in motion[1:]:
         if len(one.y) != len(first.y) or not np.allclose(one.x, first.x, rtol=1e-6, atol=step):
-            raise ValueError(
-                "datasets 58 differ in times or frequencies; export them with equal ones"
-            )
+            raise ValueError("sets 58 differ in times or frequencies; export them with equal ones")
         for key in ("quantity", "unit", "type"):
             values = getattr(first, key), getattr(one, key)
             if values[0] != values[1]:
-                each = ", ".join(map(str, values))
-                raise ValueError(f"datasets 58 differ in {key}: {each}; give --quantity")
+                raise ValueError(
+                    f"sets 58 differ in {key}: {values[0]}, {values[1]}; give --quantity"
+                )
 
 
 def _by_node(motion: list[Function]) -> list[tuple[int, list[Function]]]:
@@ -283,10 +278,8 @@ def _along_axis(motion: list[Function], given: Given) -> tuple[list[Function], i
         return motion, 0
     axis, excited = at.pop(), by.pop()
     if excited not in (0, axis) and not given.sign:
-        raise ValueError(
-            "motion and excitation are along different axes, which gives no sign; export responses "
-            "to a force along the motion, or give --positive"
-        )
+        cure = "export responses to a force along the motion, or give --positive"
+        raise ValueError(f"motion and excitation are along different axes; {cure}")
     signs = [np.sign(one.at[1]) * (np.sign(one.by[1]) or 1) for one in motion]
     turned = [replace(one, y=sign * one.y) for one, sign in zip(motion, signs, strict=True)]
     return turned, 1 if excited else -(axis == AXES["z"])

@@ -254,7 +254,7 @@ def test_tests_beside_each_other_are_chosen_by_their_columns(tmp_path):
     cells = [f"{row},{'∞' if k == 7 else 1}" for k, row in enumerate(TIMED.splitlines())]
     (tmp_path / "b.csv").write_text("\n".join(["t [s],v [mm/s],w [mm/s]", *cells]))
     assert_tone(read(tmp_path / "b.csv", columns=["v"]))
-    with pytest.raises(ValueError, match="row 8 of 'w"):
+    with pytest.raises(ValueError, match="row 8 of column 'w"):
         read(tmp_path / "b.csv")
 
 
