@@ -51,8 +51,9 @@ def read_npz(path: Path, given: Given) -> Recording:
         pass
     try:
         arrays = reading.load_arrays(path)
-    except ValueError:
-        raise ValueError("the file cannot be read as .npz; save arrays by numpy.savez") from None
+    except ValueError as error:
+        kind = ", because it holds objects of Python" if "Object" in str(error) else ""
+        raise ValueError(f"the file cannot be read as .npz{kind}; save arrays of numbers") from None
     if str(arrays.get("format", "")) == FORMAT:
         return _own(arrays)
     if functions := sdynpy_functions(arrays):
