@@ -61,6 +61,10 @@ def options(parser: argparse.ArgumentParser) -> None:
     add_mesh(parser)
     add("--csv", action="store_true", help="also write rows.csv")
     add(
+        "--all-columns", action="store_true",
+        help="write columns with one value in all rows, too, which are otherwise in the metadata",
+    )  # fmt: skip
+    add(
         "--plot", nargs="*", metavar="COLUMN",
         help="draw columns of the table into the folder figures: peak_um (default), level_db, "
         "f_AM_um[2] for one probe",
@@ -137,11 +141,11 @@ def _sweep(
         sweep = Sweep(
             folder=out, points=partial(cases, options.scene), options=solving, progress=progress,
             scheduler=options.scheduler, workers=options.workers,
-            command=record.command_entry(options),
+            command=record.command_entry(options), all_columns=options.all_columns,
         )  # fmt: skip
         outcome = sweep.run(points)
         if outcome.planned > outcome.missing:
-            failures |= dataset.failures_of(sweep.rows(points))
+            failures |= dataset.failures_of(sweep.rows(points, dataset.OUTCOME))
         if grid and not outcome.missing:
             optimum = best.find_best(sweep, grid, options.best, options.samples, options.seed)
     if has_page and not outcome.missing:

@@ -1,7 +1,9 @@
-"""Rows of a sweep on disk: small Parquet files in one folder, read as one table.
+"""Rows of a sweep on disk: a folder of Parquet files of one schema, read as one table.
 
-Each file is written under another name and then renamed, so that it is complete; no file is
-rewritten. One sweep at a time writes into a folder.
+Rows that a worker returns are a file in the folder of pieces until `merge` adds them to the table.
+Each file is written under another name and then renamed, so that it is complete. A piece is removed
+after its rows are in the table, and rows are known by their key, so that none is lost or counted
+twice however a sweep ends. One sweep at a time writes into a folder.
 """
 
 import json
@@ -9,21 +11,27 @@ import os
 import secrets
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from meshes import reading
 from skinwave.results import outputs, record
 from skinwave.results.outputs import output_file
 from skinwave.system.plain_text import csv_table
 
-ROWS, CSV = "rows", "rows.csv"  # folder of the files, and the table as CSV, in that of a sweep
+# In the folder of a sweep: those of the table and of pieces, and the table as CSV.
+ROWS, PIECES, CSV = "rows", "pieces", "rows.csv"
 LOCK = ".lock"  # file in the folder of rows
 FROM_PYTHON = {"typed": "", "name": "sweep", "options": {}}  # command of a sweep in Python
 LARGEST_FILE = 500_000_000  # bytes
 MOST_ROWS = 1_000_000  # of one file
 KEY, INDEX = "key", "index"  # columns: a row's name, and its place in the design
+OUTCOME = (INDEX, KEY, "status", "error")  # columns that files have even if all rows are alike
+CONSTANTS = b"constants"  # in the metadata of a file: JSON of the other columns with one value
 
 Row = Mapping[str, Any]
 
@@ -79,25 +87,166 @@ def _lock(descriptor: int) -> None:
 
 
 def append(out: Path, rows: Sequence[Row]) -> None:
-    """Write rows to a new file; cells may be missing."""
+    """Write rows as a piece; cells may be missing."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     names = dict.fromkeys(name for row in rows for name in row)
     table = pa.table({name: [row.get(name) for row in rows] for name in names})
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink)
-    # Another sweep into the same folder may write other rows after the same first one.
-    with output_file(out / ROWS / f"part-{rows[0][KEY]}-{secrets.token_hex(4)}.parquet") as file:
-        file.write(sink.getvalue())
+    (out / PIECES).mkdir(exist_ok=True)
+    with output_file(_piece(out, rows[0][KEY])) as file:
+        pq.write_table(table, file, compression="zstd")
 
 
-def read(out: Path) -> list[dict[str, Any]]:
-    """Return all rows once, in the order of the design; raise a ValueError if there are none."""
-    rows = list({row[KEY]: row for row in _table(out).to_pylist()}.values())
+def _piece(out: Path, name: str) -> Path:
+    return out / PIECES / f"piece-{name}-{secrets.token_hex(4)}.parquet"
+
+
+def merge(out: Path, *, all_columns: bool = False, most_bytes: int = 64_000_000) -> None:
+    """Add the pieces of a folder to its table, in files of about `most_bytes`.
+
+    All files have the same columns. Those with one value in all rows are in the metadata of each
+    file instead, unless `all_columns`. A file is rewritten if its columns change. The last one is
+    also extended, so that each file has its rows at any time.
+    """
+    import pyarrow.parquet as pq
+
+    files, pieces = _files(out)
+    with _readable(out):
+        if not pieces and all(
+            (CONSTANTS in (pq.read_schema(path).metadata or {})) != all_columns for path in files
+        ):
+            return
+        schema = _common_schema([*files, *pieces], all_columns)
+        known = {row[KEY] for path in files for row in _open(path).read([KEY]).to_pylist()}
+        new = _row_groups(chain.from_iterable(_tables(path, schema) for path in pieces), known)
+        for path in files:
+            extended = path == files[-1] and path.stat().st_size < most_bytes
+            if extended or not pq.read_schema(path).equals(schema, check_metadata=True):
+                own = _row_groups(_tables(path, schema), set())
+                _write(path, own, new if extended else iter(()), most_bytes)
+        free = (out / ROWS / f"part-{k:05}.parquet" for k in count())
+        for group in new:
+            _write(next(path for path in free if not path.exists()), [group], new, most_bytes)
+    for path in pieces:
+        path.unlink()
+    with suppress(OSError):  # of a file that is not skinwave's
+        (out / PIECES).rmdir()
+
+
+def _write(path: Path, own: Iterable[Any], more: Iterator[Any], most_bytes: int) -> None:
+    """Write row groups, and more of them up to a size, to a file of the table."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    first = next(own := iter(own), None) or next(more)
+    words = [
+        field.name for field in first.schema
+        if pa.types.is_string(field.type) and field.name not in (KEY, "scene")
+    ]  # fmt: skip
+    with output_file(path, overwrite=True) as file:
+        with pq.ParquetWriter(
+            file, first.schema, compression="zstd", use_dictionary=words
+        ) as writer:
+            for group in chain([first], own):
+                writer.write_table(group)
+            while file.tell() < most_bytes and (group := next(more, None)):
+                writer.write_table(group)
+        file.flush()
+        os.fsync(file.fileno())  # before pieces are removed
+
+
+def _row_groups(tables: Iterable[Any], known: set[str], most_bytes: int = 16_000_000) -> Any:
+    """Yield the rows of tables whose key is not yet known, in tables of about `most_bytes`."""
+    import pyarrow as pa
+
+    held: list[Any] = []
+    for table in tables:
+        keys = table[KEY].to_pylist()
+        held.append(table.filter([not (key in known or known.add(key)) for key in keys]))
+        if sum(each.nbytes for each in held) >= most_bytes:
+            yield pa.concat_tables(held).sort_by(INDEX)
+            held = []
+    if sum(map(len, held)):
+        yield pa.concat_tables(held).sort_by(INDEX)
+
+
+def _common_schema(paths: Sequence[Path], all_columns: bool) -> Any:
+    """Return the columns of files, and in its metadata those with the same value in all rows."""
+    import pyarrow as pa
+
+    schemas, values = [], list[dict[str, Any]]()  # of columns by name, nan if they differ
+    for path in paths:
+        file = _open(path)
+        same, several = _constants(file), dict.fromkeys(file.schema_arrow.names, np.nan)
+        schemas += [file.schema_arrow.remove_metadata(), pa.Table.from_pylist([same]).schema]
+        is_merged = CONSTANTS in (file.schema_arrow.metadata or {})
+        groups = [] if is_merged else map(file.read_row_group, range(file.num_row_groups))
+        values += [several | _one_value(group) for group in groups] or [several | same]
+    schema = pa.unify_schemas(schemas, promote_options="permissive")
+    if all_columns:
+        return schema
+    constants = {
+        name: values[0].get(name) for name in schema.names
+        if name not in OUTCOME and all(x.get(name) == values[0].get(name) for x in values)
+    }  # fmt: skip
+    kept = [field for field in schema if field.name not in constants]
+    return pa.schema(kept, {CONSTANTS: json.dumps(constants).encode()})
+
+
+def _one_value(table: Any) -> dict[str, Any]:
+    """Return the value of each column that has only one."""
+    import pyarrow as pa
+
+    first = table.slice(0, 1).to_pylist()[0]
+    return {
+        name: x for name, x in first.items()
+        if table[name].equals(pa.chunked_array([pa.array([x] * len(table), table[name].type)]))
+    }  # fmt: skip
+
+
+def _constants(file: Any) -> dict[str, Any]:
+    """Return the columns in the metadata of a file."""
+    found = json.loads((file.schema_arrow.metadata or {}).get(CONSTANTS, b"{}"))
+    if not isinstance(found, dict):
+        raise ValueError("its constant columns are not a table")
+    return {name: x for name, x in found.items() if name not in file.schema_arrow.names}
+
+
+def _tables(path: Path, schema: Any) -> Iterator[Any]:
+    """Yield the row groups of a file with the columns of a schema."""
+    import pyarrow as pa
+
+    file = _open(path)
+    same = _constants(file)
+    for k in range(file.num_row_groups):
+        group = file.read_row_group(k)
+        columns = [
+            group[field.name].cast(field.type) if field.name in group.column_names
+            else pa.array([same.get(field.name)] * len(group), field.type)
+            for field in schema
+        ]  # fmt: skip
+        yield pa.table(columns, schema=schema)
+
+
+def read(out: Path, columns: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """Return all rows once, in the order of the design, with all columns or those asked for.
+
+    Raises a ValueError if there are none.
+    """
+    rows: dict[str, Row] = {}
+    with _readable(out):
+        for path in chain(*_files(out)):
+            file = _open(path)
+            same = _constants(file)
+            names = [name for name in file.schema_arrow.names if not columns or name in columns]
+            for row in file.read(names).to_pylist():
+                rows.setdefault(row[KEY], same | row)
     if not rows:
         raise ValueError(f"{out} contains no rows of a sweep; name the folder of a sweep")
-    return sorted(rows, key=lambda row: row[INDEX])
+    every = columns or dict.fromkeys(chain((INDEX, KEY), *rows.values()))
+    ordered = sorted(rows.values(), key=lambda row: row[INDEX])
+    return [{name: row.get(name) for name in every} for row in ordered]
 
 
 def failures_of(rows: Iterable[Row]) -> dict[str, str]:
@@ -107,8 +256,13 @@ def failures_of(rows: Iterable[Row]) -> dict[str, str]:
 
 def names(out: Path) -> dict[str, int]:
     """Return the index of each row by its name."""
-    table = _table(out).select([KEY, INDEX])
-    return dict(zip(table[KEY].to_pylist(), table[INDEX].to_pylist(), strict=True))
+    with _readable(out):
+        found = [_open(path).read([KEY, INDEX]) for path in chain(*_files(out))]
+    return {
+        name: index
+        for table in found
+        for name, index in zip(table[KEY].to_pylist(), table[INDEX].to_pylist(), strict=True)
+    }
 
 
 def number_rows(wanted: Iterable[str], earlier: Mapping[str, int]) -> dict[str, int]:
@@ -120,20 +274,25 @@ def number_rows(wanted: Iterable[str], earlier: Mapping[str, int]) -> dict[str, 
     return {name: first + k for k, name in enumerate(n for n in places if n not in earlier)}
 
 
-def _table(out: Path) -> Any:
-    """Return the rows of all files; raise a ValueError if they are not rows of a sweep."""
+def _files(out: Path) -> tuple[list[Path], list[Path]]:
+    """Return the files of the table, and the pieces that are not yet in it."""
+    pieces = (out / PIECES).glob("piece-*.parquet")
+    return sorted((out / ROWS).glob("part-*.parquet")), sorted(pieces)
+
+
+@contextmanager
+def _readable(out: Path) -> Iterator[None]:
+    """Raise a ValueError if files are not rows of a sweep."""
     import pyarrow as pa
 
-    empty = pa.table({KEY: pa.array([], pa.string()), INDEX: pa.array([], pa.int64())})
     try:
-        parts = [_part(part) for part in sorted((out / ROWS).glob("part-*.parquet"))]
-        return pa.concat_tables([empty, *parts], promote_options="permissive")
-    except (OSError, KeyError, ValueError, pa.ArrowException) as error:
+        yield
+    except (KeyError, ValueError, pa.ArrowException) as error:
         cause = " ".join(str(error).split())[:200]
         raise ValueError(f"{out} cannot be read ({cause}); name the folder of a sweep") from None
 
 
-def _part(path: Path) -> Any:
+def _open(path: Path) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -142,11 +301,12 @@ def _part(path: Path) -> Any:
         raise ValueError(
             f"{path.name} has {file.metadata.num_rows:,} rows; a sweep writes at most {MOST_ROWS:,}"
         )
-    table = file.read()
-    is_named = pa.types.is_string(table[KEY].type) and pa.types.is_integer(table[INDEX].type)
-    if not is_named or table[KEY].null_count or table[INDEX].null_count:
+    schema = file.schema_arrow
+    if not (
+        pa.types.is_string(schema.field(KEY).type) and pa.types.is_integer(schema.field(INDEX).type)
+    ):
         raise ValueError(f"a row of {path.name} has no {KEY} or no {INDEX}")
-    return table
+    return file
 
 
 def csv_of(rows: Iterable[Row]) -> bytes:

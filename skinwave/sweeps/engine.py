@@ -1,12 +1,24 @@
 """Many runs at once: in threads, in processes, or on the workers of a Dask scheduler.
 
-This module imports nothing that loads numpy, because a worker process sets its threads first.
+Items are handed out in pieces of about equal time, a few for each worker. This module imports
+nothing that loads numpy, because a worker process sets its threads first.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
+from functools import partial
+from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
 
@@ -14,8 +26,10 @@ from skinwave.system.effort import usable_cores
 from skinwave.system.processes import pool
 
 LOCAL = ("processes", "threads")
-ATTEMPTS = 4  # to finish items whose worker was killed
+ATTEMPTS = 3  # at items whose worker is killed: in a piece, as a piece, and with no other running
+IN_FLIGHT = 2  # pieces for each worker
 CONNECTION_TIMEOUT = 10  # s
+POLLING = 5  # s, after which new workers of a scheduler get pieces
 
 
 def check(scheduler: str) -> None:
@@ -40,7 +54,7 @@ def worker_count(scheduler: str, workers: int | None = None) -> int:
     if scheduler in LOCAL:
         return workers or usable_cores()
     with _client(scheduler) as client:
-        return max(1, sum(client.nthreads().values()))
+        return _threads(client, set())
 
 
 def run_all(
@@ -48,55 +62,125 @@ def run_all(
     items: Sequence[Any],
     scheduler: str,
     count: int,
-    done: Callable[[int, Any], None],
+    done: Callable[[Mapping[int, Any]], None],
+    *,
+    seconds: float = 20.0,
 ) -> None:
-    """Compute items on workers; call `done(index, result)` here as each one is finished.
+    """Compute items on `count` workers; call `done(results by index)` here after each piece.
 
-    If a worker is killed, others repeat its item. Items that kill every worker are left out.
+    A piece takes about `seconds`: its length follows from the last one, and a worker returns what
+    it has by then. If a worker is killed, others repeat its items, one at a time. Items that kill
+    every worker are left out.
     """
-    if not items:
-        return
-    if scheduler not in LOCAL:
-        _run_on_cluster(work, items, scheduler, done)
-        return
-    missing = dict(enumerate(items))
-    for _ in range(ATTEMPTS):
-        with suppress(BrokenProcessPool), _executor(scheduler, count) as executor:
-            futures = {executor.submit(work, item): k for k, item in missing.items()}
-            for future in as_completed(futures):
-                done(futures[future], future.result())
-                del missing[futures[future]]
-        if not missing:
-            return
+    waiting, killed, size = deque(range(len(items))), Counter[int](), 1
+    limit = [seconds]
+    while waiting:
+        running, broken = dict[Future[Any], list[int]](), False
+        with _executor(scheduler, count, limit) as (executor, workers):
+            while running or (waiting and not broken):
+                most = workers()
+                while not broken and (piece := _take(waiting, killed, size, running, most)):
+                    try:
+                        future = executor.submit(_compute, work, [items[k] for k in piece], limit)
+                        running[future] = piece
+                    except BrokenProcessPool:
+                        waiting.extendleft(reversed(piece))
+                        broken = True
+                polling = None if scheduler in LOCAL else POLLING
+                for future in wait(running, polling, FIRST_COMPLETED).done:
+                    piece, error = running.pop(future), future.exception()
+                    if type(error).__name__ in ("BrokenProcessPool", "KilledWorker"):
+                        killed.update(piece)
+                        waiting.extend(k for k in piece if killed[k] < ATTEMPTS)
+                        broken |= isinstance(error, BrokenProcessPool)
+                        continue
+                    results, took = future.result()
+                    n = len(results)
+                    waiting.extendleft(reversed(piece[n:]))
+                    size = max(1, int(min(4 * n, n * seconds / max(took, 1e-9))))
+                    done(dict(zip(piece, results, strict=False)))
+
+
+def _take(
+    waiting: deque[int],
+    killed: Mapping[int, int],
+    size: int,
+    running: Mapping[Any, Sequence[int]],
+    workers: int,
+) -> list[int]:
+    """Take the next piece of at most `size` from the waiting items; none if it has to wait."""
+    if not waiting or len(running) >= IN_FLIGHT * workers:
+        return []
+    heads = [waiting[0], *(piece[0] for piece in running.values())]
+    if running and any(killed[k] == ATTEMPTS - 1 for k in heads):
+        return []  # whether an item kills its worker is certain only if no other runs
+    # Pieces at the end are smaller, so that no worker waits long for the last.
+    size = min(size, len(waiting) // (2 * IN_FLIGHT * workers))
+    piece = [waiting.popleft()]
+    while len(piece) < size and not (killed[piece[0]] or killed[waiting[0]]):
+        piece.append(waiting.popleft())
+    return piece
+
+
+def _compute(
+    work: Callable[[Any], Any], items: Sequence[Any], limit: Sequence[float]
+) -> tuple[list[Any], float]:
+    """Return, on a worker, the results of the first items, at least one, and their seconds."""
+    results, started = [], time.perf_counter()
+    for item in items:
+        results.append(work(item))
+        if time.perf_counter() - started >= limit[0]:
+            break
+    return results, time.perf_counter() - started
 
 
 @contextmanager
-def _executor(scheduler: str, count: int) -> Iterator[Executor]:
-    """Yield workers of this machine; unfinished work is cancelled at the end."""
+def _executor(
+    scheduler: str, count: int, limit: list[float]
+) -> Iterator[tuple[Executor, Callable[[], int]]]:
+    """Yield workers and a function of their number; unfinished work is cancelled at the end."""
     if scheduler == "processes":
         threads = max(1, usable_cores() // count)  # of linear algebra in each process
         with pool(count, threads) as executor:
-            yield executor
-        return
-    threads_here = ThreadPoolExecutor(count)
-    try:
-        yield threads_here
-    finally:
-        threads_here.shutdown(wait=False, cancel_futures=True)
+            yield executor, lambda: count
+    elif scheduler == "threads":
+        threads_here = ThreadPoolExecutor(count)
+        try:
+            yield threads_here, lambda: count
+        finally:
+            limit[0] = 0.0  # threads share this list: each ends after its present item
+            threads_here.shutdown(wait=False, cancel_futures=True)
+    else:
+        with _client(scheduler) as client:
+            there = client.get_executor(pure=False)
+            try:
+                yield there, partial(_threads, client, set())
+            except CancelledError:
+                raise ValueError(
+                    f"the Dask scheduler at {scheduler} has ended; start it and repeat the command"
+                ) from None
+            finally:
+                there.shutdown(wait=False)
 
 
-def _run_on_cluster(
-    work: Callable[[Any], Any], items: Sequence[Any], address: str, done: Callable[[int, Any], None]
-) -> None:
-    from distributed import KilledWorker
-    from distributed import as_completed as finished_futures
+def _threads(client: Any, known: set[str]) -> int:
+    """Return the number of threads of all workers, at least 1, and add the workers to those known.
 
-    with _client(address) as client:
-        futures = {client.submit(work, item, pure=False): k for k, item in enumerate(items)}
-        for future in finished_futures(list(futures), loop=client.loop):
-            with suppress(KilledWorker):
-                done(futures[future], future.result())
-            future.release()
+    Raises a ValueError if a new worker has another version of a package.
+    """
+    threads: dict[str, int] = client.nthreads()
+    new = sorted(threads.keys() - known)
+    for name in ("skinwave", "numpy", "scipy") if new else ():
+        own, found = version(name), client.run(version, name, workers=new, on_error="return")
+        for address, theirs in found.items():
+            if theirs != own and not isinstance(theirs, OSError):  # of a worker that has ended
+                theirs = theirs if isinstance(theirs, str) else "not installed"
+                raise ValueError(
+                    f"{name} is {theirs} on the Dask worker {address}, but {own} here; install the "
+                    "same version on both"
+                )
+    known.update(new)
+    return max(1, sum(threads.values()))
 
 
 @contextmanager

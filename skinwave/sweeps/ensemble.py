@@ -6,7 +6,7 @@ cases the model of the scene computes each sample. Motion of a linear body is pr
 pressure, so that samples that differ only in pressure are solved once.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from typing import Any
@@ -47,8 +47,7 @@ from skinwave.typing import Complex, Floats
 WEAKEST_LINE = 1e-2  # of the strongest line of the load: weaker ones are not evaluated
 MOST_LINES = 24
 NEGLIGIBLE_LINE = 1e-3  # of the load's strongest line: weaker ones are left out of solutions
-BATCH = 16  # samples that are handed out together
-FEW = 2 * BATCH  # samples up to which starting processes costs more than it saves
+FEW = 32  # samples up to which starting processes costs more than it saves
 STEP = 0.004  # m, of a map
 ROUND_OFF = 1e-12  # of the largest line
 # Quantiles of each number between which bodies are reduced together: a palm needs 785 vectors for
@@ -208,24 +207,23 @@ def ensemble(
         if (values[:, k] > 0).all():
             factors, different[:, k] = values[:, k], 1.0
     different, place = np.unique(different, axis=0, return_inverse=True)
-    batches = np.split(different, range(BATCH, len(different), BATCH))
-    solved: dict[int, list[Solution]] = {}
+    solved: dict[int, Solution] = {}
 
-    def done(k: int, solutions: list[Solution]) -> None:
-        solved[k] = solutions
-        progress("samples", len(solved) / len(batches))
+    def done(solutions: Mapping[int, Solution]) -> None:
+        solved.update(solutions)
+        progress("samples", len(solved) / len(different))
 
     progress("samples", 0.0)
-    work = partial(_solve_batch, scene, keys, method)
+    work = partial(_solve, scene, keys, method)
     if workers > 1 and len(different) > FEW:
-        engine.run_all(work, batches, "processes", workers, done)
+        engine.run_all(work, different, "processes", workers, done)
     else:
         with one_thread():
-            for k, batch in enumerate(batches):
-                done(k, work(batch))
-    if len(solved) < len(batches):
+            for k, sample in enumerate(different):
+                done({k: work(sample)})
+    if len(solved) < len(different):
         raise ValueError("workers were killed; provide more memory, or use fewer workers")
-    solutions = [solution for k in range(len(batches)) for solution in solved[k]]
+    solutions = [solved[k] for k in range(len(different))]
     arrays = {
         name: _scale(
             name, np.stack([vars(each)[name] for each in solutions])[place.ravel()], factors
@@ -255,23 +253,18 @@ def _scale(name: str, values: Floats, factors: Floats) -> Floats:
     return np.asarray(columns.T)
 
 
-def _solve_batch(
-    scene: Scene, keys: tuple[str, ...], method: Method, values: Floats
-) -> list[Solution]:
-    """Solve some samples (b, d) on a worker."""
-    solutions = []
-    for row in values.tolist():
-        changed = dict(zip(keys, row, strict=True))
-        together = method.family is not None and method.family.has(changed)
-        try:
-            solutions.append(solve_sample(with_values(scene, changed), method, together=together))
-        except ValueError as error:
-            sample = ", ".join(f"{key} = {x:.4g}" for key, x in changed.items())
-            raise ValueError(
-                f"the sample with {sample} cannot be computed ({error}); narrow its distribution, "
-                "or give low and high"
-            ) from None
-    return solutions
+def _solve(scene: Scene, keys: tuple[str, ...], method: Method, values: Floats) -> Solution:
+    """Solve one sample (d,) on a worker."""
+    changed = dict(zip(keys, values.tolist(), strict=True))
+    together = method.family is not None and method.family.has(changed)
+    try:
+        return solve_sample(with_values(scene, changed), method, together=together)
+    except ValueError as error:
+        sample = ", ".join(f"{key} = {x:.4g}" for key, x in changed.items())
+        raise ValueError(
+            f"the sample with {sample} cannot be computed ({error}); narrow its distribution, "
+            "or give low and high"
+        ) from None
 
 
 def rows_of(found: Ensemble) -> list[dict[str, Any]]:

@@ -36,7 +36,8 @@ Values = tuple[tuple[str, float], ...]  # of free keys
 # Each with the values of its bodies. A body is a scene `without_tacton`.
 Families = list[tuple[Covering, dict[Scene, Values]]]
 Limits = Mapping[str, tuple[float, float]]  # least and largest value by key
-Distribute = Callable[[Callable[[Any], Any], Sequence[Any], Callable[[int, Any], None]], None]
+Done = Callable[[Mapping[int, Any]], None]  # with results by index
+Distribute = Callable[[Callable[[Any], Any], Sequence[Any], Done], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,8 +98,8 @@ def shared_meshes(
     def meshes_of(work: Callable[..., Mesh], items: Sequence[Any]) -> list[Mesh]:
         made: dict[int, Mesh] = {}
 
-        def done(k: int, mesh: Mesh) -> None:
-            made[k] = mesh
+        def done(meshes: Mapping[int, Mesh]) -> None:
+            made.update(meshes)
             progress("reduce bodies", len(made) / len(items))
 
         distribute(partial(_mesh_or_error, work, options), items, done)

@@ -1,7 +1,7 @@
 """Parameter sweep: many scenes in one table. Each body is reduced once, and each scene run once."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -28,7 +28,6 @@ from skinwave.sweeps.reductions import (
 from skinwave.system.effort import Progress, silent
 from skinwave.system.failures import reason
 
-BATCH = 8  # most runs of one body that are handed out together
 Combinations = Sequence[Mapping[str, Any]]  # values by key, for each run
 
 
@@ -63,6 +62,7 @@ class Sweep:
     scheduler : "processes", "threads", or the address of a Dask scheduler
     workers : number of runs at a time on this machine; all cores by default
     command : `record.command_entry` for the record.json of a new folder
+    all_columns : whether files also have the columns with one value in all rows
     """
 
     folder: Path
@@ -73,6 +73,7 @@ class Sweep:
     scheduler: str = "processes"
     workers: int | None = None
     command: Mapping[str, Any] | None = None
+    all_columns: bool = False
 
     def run(self, points: Sequence[DesignPoint]) -> SweepOutcome:
         """Run every point without a row in the folder, and append its row.
@@ -84,11 +85,13 @@ class Sweep:
         count = engine.worker_count(self.scheduler, self.workers)
         wanted = {self._name(point): point for point in points}
         with dataset.lock_rows(dataset.open_folder(self.folder, self.command)):
-            return self._run_missing(wanted, count)
+            outcome = self._run_missing(wanted, count)
+            dataset.merge(self.folder, all_columns=self.all_columns)
+        return outcome
 
-    def rows(self, points: Sequence[DesignPoint]) -> list[dataset.Row]:
-        """Return the row of each point that has one."""
-        by_name = {row[dataset.KEY]: row for row in dataset.read(self.folder)}
+    def rows(self, points: Sequence[DesignPoint], columns: Sequence[str] = ()) -> list[dataset.Row]:
+        """Return the row of each point that has one, with all columns or some."""
+        by_name = {row[dataset.KEY]: row for row in dataset.read(self.folder, columns)}
         rows = (by_name.get(self._name(point)) for point in points)
         return [row for row in rows if row]
 
@@ -110,11 +113,11 @@ class Sweep:
             "asked_h_mm": 1e3 * self.options.h if self.options.h else None,
         }  # fmt: skip
 
-        def write(rows: Sequence[dict[str, Any]]) -> None:
-            if rows:
-                numbered = [{"index": index[row["key"]]} | constant | row for row in rows]
+        def write(rows: Iterable[dict[str, Any]]) -> None:
+            numbered = [{"index": index[row["key"]]} | constant | row for row in rows]
+            if numbered:
                 dataset.append(self.folder, numbered)
-            for row in rows:
+            for row in numbered:
                 tally[row["status"]] += 1
             self.progress("run", sum(tally.values()) / max(len(missing), 1))
 
@@ -129,10 +132,9 @@ class Sweep:
                 for name, point in missing.items() if name not in runs
             ])  # fmt: skip
             meshes = shared_meshes(runs.values(), self.options, count, distribute, self.progress)
-            batches = self._batches(runs, meshes, count)
             write([])
-            work = partial(_rows, self.options, self.assessed)
-            distribute(work, batches, lambda _, rows: write(rows))
+            work = partial(_row, self.options, self.assessed)
+            distribute(work, self._items(runs, meshes), lambda rows: write(rows.values()))
         except KeyboardInterrupt:
             interrupted = True
         return SweepOutcome(
@@ -140,35 +142,26 @@ class Sweep:
             interrupted=interrupted, seconds=time.perf_counter() - started,
         )  # fmt: skip
 
-    def _batches(
-        self, runs: Mapping[str, DesignPoint], meshes: Mapping[Scene, Mesh], count: int
-    ) -> list[tuple[dict[str, DesignPoint], Mesh | None]]:
-        """Group runs on one body, and other runs if they are short."""
+    def _items(
+        self, runs: Mapping[str, DesignPoint], meshes: Mapping[Scene, Mesh]
+    ) -> list[tuple[str, DesignPoint, Mesh | None]]:
+        """Return the arguments of each run, those on one body together."""
         groups: dict[Scene | None, list[str]] = {}
         for name, point in runs.items():
             groups.setdefault(reduced_scene(point, self.options), []).append(name)
-        # Several batches for each worker, so that none waits long for the last.
-        size = max(1, min(BATCH, len(runs) // (4 * count)))
         return [
-            ({n: runs[n] for n in members[k : k + step]}, meshes[solid] if solid else None)
+            (name, runs[name], meshes[solid] if solid else None)
             for solid, members in groups.items()
-            for step in [size if solid or not self.assessed else 1]
-            for k in range(0, len(members), step)
+            for name in members
         ]
 
 
-def _rows(
-    options: SolveOptions, assessed: bool, batch: tuple[dict[str, DesignPoint], Mesh | None]
-) -> list[dict[str, Any]]:
-    """Run a batch on a worker."""
-    runs, mesh = batch
-    return [{"key": name} | _row(point, options, assessed, mesh) for name, point in runs.items()]
-
-
 def _row(
-    point: DesignPoint, options: SolveOptions, assessed: bool, mesh: Mesh | None
+    options: SolveOptions, assessed: bool, item: tuple[str, DesignPoint, Mesh | None]
 ) -> dict[str, Any]:
-    row, started = input_columns(point), time.perf_counter()
+    """Return the row of one run, on a worker."""
+    name, point, mesh = item
+    row, started = {"key": name} | input_columns(point), time.perf_counter()
     assert point.scene
     try:
         if mesh is None:

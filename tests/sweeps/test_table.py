@@ -49,7 +49,7 @@ def test_rows_have_the_order_of_the_design_and_are_not_repeated(scene, monkeypat
         part.unlink()
     assert [row["key"] for row in swept(*vary)] == [row["key"] for row in rows]  # resumed
     with monkeypatch.context() as patch:
-        patch.setattr(sweeping, "_row", None)  # any run would fail
+        patch.setattr(sweeping, "_row", lambda *given: 1 / 0)  # any run would fail
         swept(*vary)
     more = swept("--vary", f"{SPEED}=5,4", f"{SIZE}=9", "--csv", *KERNEL)
     assert [(row[SPEED], row[SIZE]) for row in more] == [*design, (5, 9)]
@@ -138,7 +138,7 @@ def test_items_of_a_killed_worker_are_repeated(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     work = partial(import_module("dying").work, tmp_path / "died")
     found = {}
-    engine.run_all(work, range(4), "processes", 1, found.__setitem__)
+    engine.run_all(work, range(4), "processes", 1, found.update)
     assert found == {k: k for k in range(4)}
 
 
