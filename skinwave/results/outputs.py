@@ -70,7 +70,8 @@ def output_path(
         raise ValueError(f"{out} exists. Give --overwrite to replace it, or another name")
     if any(os.path.exists(path) and os.path.samefile(path, out) for path in inputs if out.exists()):
         raise ValueError(f"{out} is an input of this command. Give another name")
-    partial = temporary_path(out, "partial").with_suffix(out.suffix)
+    partial = temporary_path(out, "partial")
+    partial = partial.with_name(partial.name + out.suffix)
     try:
         yield partial
         os.replace(partial, out)

@@ -1,9 +1,9 @@
 """Rows of a sweep on disk: a folder of Parquet files of one schema, read as one table.
 
 Rows that a worker returns are a file in the folder of pieces until `merge` adds them to the table.
-Each file is written under another name and then renamed, so that it is complete. A piece is removed
-after its rows are in the table, and rows are known by their key, so that none is lost or counted
-twice however a sweep ends. One sweep at a time writes into a folder.
+Each file is written elsewhere and then renamed, so that it is complete. A piece is removed after
+its rows are in the table, and rows are known by their key, so that none is lost or counted twice
+however a sweep ends. One sweep at a time writes into a folder.
 """
 
 import json
@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import chain, count
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -94,12 +94,20 @@ def append(out: Path, rows: Sequence[Row]) -> None:
     names = dict.fromkeys(name for row in rows for name in row)
     table = pa.table({name: [row.get(name) for row in rows] for name in names})
     (out / PIECES).mkdir(exist_ok=True)
-    with output_file(_piece(out, rows[0][KEY])) as file:
+    name = f"piece-{rows[0][KEY]}-{secrets.token_hex(4)}.parquet"
+    with _complete_file(out / PIECES / name) as file:
         pq.write_table(table, file, compression="zstd")
 
 
-def _piece(out: Path, name: str) -> Path:
-    return out / PIECES / f"piece-{name}-{secrets.token_hex(4)}.parquet"
+@contextmanager
+def _complete_file(path: Path) -> Iterator[IO[bytes]]:
+    """Yield a file that is in its folder only when it is complete, however the process ends."""
+    beside = path.parents[1] / path.name
+    with output_file(beside, overwrite=True) as file:
+        yield file
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(beside, path)
 
 
 def merge(out: Path, *, all_columns: bool = False, most_bytes: int = 64_000_000) -> None:
@@ -119,11 +127,13 @@ def merge(out: Path, *, all_columns: bool = False, most_bytes: int = 64_000_000)
             return
         schema = _common_schema([*files, *pieces], all_columns)
         known = {row[KEY] for path in files for row in _open(path).read([KEY]).to_pylist()}
-        new = _row_groups(chain.from_iterable(_tables(path, schema) for path in pieces), known)
+        size = most_bytes // 4
+        added = chain.from_iterable(_tables(path, schema) for path in pieces)
+        new = _row_groups(added, known, size)
         for path in files:
             extended = path == files[-1] and path.stat().st_size < most_bytes
             if extended or not pq.read_schema(path).equals(schema, check_metadata=True):
-                own = _row_groups(_tables(path, schema), set())
+                own = _row_groups(_tables(path, schema), set(), size)
                 _write(path, own, new if extended else iter(()), most_bytes)
         free = (out / ROWS / f"part-{k:05}.parquet" for k in count())
         for group in new:
@@ -144,19 +154,15 @@ def _write(path: Path, own: Iterable[Any], more: Iterator[Any], most_bytes: int)
         field.name for field in first.schema
         if pa.types.is_string(field.type) and field.name not in (KEY, "scene")
     ]  # fmt: skip
-    with output_file(path, overwrite=True) as file:
-        with pq.ParquetWriter(
-            file, first.schema, compression="zstd", use_dictionary=words
-        ) as writer:
-            for group in chain([first], own):
-                writer.write_table(group)
-            while file.tell() < most_bytes and (group := next(more, None)):
-                writer.write_table(group)
-        file.flush()
-        os.fsync(file.fileno())  # before pieces are removed
+    how = {"compression": "zstd", "use_dictionary": words}
+    with _complete_file(path) as file, pq.ParquetWriter(file, first.schema, **how) as writer:
+        for group in chain([first], own):
+            writer.write_table(group)
+        while file.tell() < most_bytes and (group := next(more, None)):
+            writer.write_table(group)
 
 
-def _row_groups(tables: Iterable[Any], known: set[str], most_bytes: int = 16_000_000) -> Any:
+def _row_groups(tables: Iterable[Any], known: set[str], most_bytes: int) -> Iterator[Any]:
     """Yield the rows of tables whose key is not yet known, in tables of about `most_bytes`."""
     import pyarrow as pa
 

@@ -20,9 +20,9 @@ from skinwave.report.column_labels import axis_label
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import Choice, Variation, cases_of, combinations, parse
-from skinwave.sweeps import best
+from skinwave.sweeps import best, dataset
 from skinwave.sweeps.sweep import Sweep
-from skinwave.sweeps.table_figures import curves, finished_rows, value
+from skinwave.sweeps.table_figures import curves, finished_rows, value, varied_keys
 from skinwave.system.effort import Progress
 from skinwave.system.progress_bar import progress_callback
 from skinwave.system.table import cell_text
@@ -172,6 +172,15 @@ def sweep(
             raise KeyboardInterrupt
         rows = tuple(made.rows(points))
     return SweepTable(rows=rows, varied=tuple(v.key for v in variations))
+
+
+def read_sweep(folder: str | Path) -> SweepTable:
+    """Read the table of a sweep's folder, with the columns that its files have in their metadata.
+
+    Raises a ValueError if the folder contains no rows of a sweep.
+    """
+    rows = tuple(dataset.read(Path(folder)))
+    return SweepTable(rows=rows, varied=tuple(varied_keys(rows)))
 
 
 def best_value(
