@@ -59,16 +59,23 @@ Variation = Choice | Spread
 class DesignPoint:
     """One run of a sweep: its `varied` keys and the scene, or an `error` instead.
 
-    `keys` and `text` are those of the scene's file. `before` is the scene without factors on all
-    moduli or losses of a material.
+    `text` is that of the scene's file. `before` is the scene without factors on all moduli or losses
+    of a material.
     """
 
     varied: Mapping[str, Any]
-    keys: Mapping[str, float | str]
     text: str
     scene: Scene | None = None
     before: Scene | None = None
     error: str = ""
+
+    @property
+    def keys(self) -> dict[str, float | str]:
+        """Keys of the scene's file, with their section, and their values as cells of a table."""
+        keys = _flat(without_spreads(tomllib.loads(self.text))[0])
+        for key, value in self.varied.items():  # words for numbers, such as depths, become numbers
+            keys[key] = keys[key] if isinstance(keys.get(key), float) else _plain(value)
+        return keys
 
     def name(self, *model_options: object) -> str:
         """Return a hash of the complete scene, the file of its body and the solver options."""
@@ -278,12 +285,7 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
         text = dumps(scene)
     except ValueError as refused:
         error = str(refused)
-    keys = _flat(without_spreads(tomllib.loads(text))[0])
-    for key, value in varied.items():  # words for numbers, such as depths, become numbers
-        keys[key] = keys[key] if isinstance(keys.get(key), float) else _plain(value)
-    return DesignPoint(
-        varied=varied, keys=keys, text=text, scene=scene, before=before, error=error
-    )  # fmt: skip
+    return DesignPoint(varied=varied, text=text, scene=scene, before=before, error=error)
 
 
 def _change(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:

@@ -92,7 +92,13 @@ def append(out: Path, rows: Sequence[Row]) -> None:
     import pyarrow.parquet as pq
 
     names = dict.fromkeys(name for row in rows for name in row)
-    table = pa.table({name: [row.get(name) for row in rows] for name in names})
+    cells = {name: [row.get(name) for row in rows] for name in names}
+    same = {
+        name: column[0] for name, column in cells.items()
+        if name not in OUTCOME and all(cell == column[0] for cell in column)
+    }  # fmt: skip
+    table = pa.table({name: column for name, column in cells.items() if name not in same})
+    table = table.replace_schema_metadata({CONSTANTS: json.dumps(same, default=float)})
     (out / PIECES).mkdir(exist_ok=True)
     name = f"piece-{rows[0][KEY]}-{secrets.token_hex(4)}.parquet"
     with _complete_file(out / PIECES / name) as file:
@@ -113,26 +119,20 @@ def _complete_file(path: Path) -> Iterator[IO[bytes]]:
 def merge(out: Path, *, all_columns: bool = False, most_bytes: int = 64_000_000) -> None:
     """Add the pieces of a folder to its table, in files of about `most_bytes`.
 
-    All files have the same columns. Those with one value in all rows are in the metadata of each
-    file instead, unless `all_columns`. A file is rewritten if its columns change. The last one is
-    also extended, so that each file has its rows at any time.
+    All files have the same columns. Those with one value in all rows are only in the metadata of
+    each file, unless `all_columns`. A file is rewritten if its columns change, and the last one to
+    add rows; each file has its earlier rows at any time.
     """
-    import pyarrow.parquet as pq
-
     files, pieces = _files(out)
     with _readable(out):
-        if not pieces and all(
-            (CONSTANTS in (pq.read_schema(path).metadata or {})) != all_columns for path in files
-        ):
-            return
         schema = _common_schema([*files, *pieces], all_columns)
         known = {row[KEY] for path in files for row in _open(path).read([KEY]).to_pylist()}
-        size = most_bytes // 4
         added = chain.from_iterable(_tables(path, schema) for path in pieces)
+        size = most_bytes // 4
         new = _row_groups(added, known, size)
         for path in files:
-            extended = path == files[-1] and path.stat().st_size < most_bytes
-            if extended or not pq.read_schema(path).equals(schema, check_metadata=True):
+            extended = pieces and path == files[-1] and path.stat().st_size < most_bytes
+            if extended or not _open(path).schema_arrow.equals(schema, check_metadata=True):
                 own = _row_groups(_tables(path, schema), set(), size)
                 _write(path, own, new if extended else iter(()), most_bytes)
         free = (out / ROWS / f"part-{k:05}.parquet" for k in count())
@@ -140,7 +140,7 @@ def merge(out: Path, *, all_columns: bool = False, most_bytes: int = 64_000_000)
             _write(next(path for path in free if not path.exists()), [group], new, most_bytes)
     for path in pieces:
         path.unlink()
-    with suppress(OSError):  # of a file that is not skinwave's
+    with suppress(OSError):  # there is none, or it has a file that is not skinwave's
         (out / PIECES).rmdir()
 
 
@@ -166,14 +166,16 @@ def _row_groups(tables: Iterable[Any], known: set[str], most_bytes: int) -> Iter
     """Yield the rows of tables whose key is not yet known, in tables of about `most_bytes`."""
     import pyarrow as pa
 
-    held: list[Any] = []
+    held, size = list[Any](), 0
     for table in tables:
         keys = table[KEY].to_pylist()
-        held.append(table.filter([not (key in known or known.add(key)) for key in keys]))
-        if sum(each.nbytes for each in held) >= most_bytes:
+        held.append(table.filter([key not in known for key in keys]))
+        known.update(keys)
+        size += held[-1].nbytes
+        if size >= most_bytes:
             yield pa.concat_tables(held).sort_by(INDEX)
-            held = []
-    if sum(map(len, held)):
+            held, size = [], 0
+    if size:
         yield pa.concat_tables(held).sort_by(INDEX)
 
 
@@ -181,42 +183,27 @@ def _common_schema(paths: Sequence[Path], all_columns: bool) -> Any:
     """Return the columns of files, and in its metadata those with the same value in all rows."""
     import pyarrow as pa
 
-    schemas, values = [], list[dict[str, Any]]()  # of columns by name, nan if they differ
+    schemas, values = [pa.schema([])], list[dict[str, Any]]()  # by column, nan if they differ
     for path in paths:
         file = _open(path)
-        same, several = _constants(file), dict.fromkeys(file.schema_arrow.names, np.nan)
+        same = _constants(file)
         schemas += [file.schema_arrow.remove_metadata(), pa.Table.from_pylist([same]).schema]
-        is_merged = CONSTANTS in (file.schema_arrow.metadata or {})
-        groups = [] if is_merged else map(file.read_row_group, range(file.num_row_groups))
-        values += [several | _one_value(group) for group in groups] or [several | same]
+        values.append(dict.fromkeys(file.schema_arrow.names, np.nan) | same)
     schema = pa.unify_schemas(schemas, promote_options="permissive")
-    if all_columns:
-        return schema
     constants = {
         name: values[0].get(name) for name in schema.names
-        if name not in OUTCOME and all(x.get(name) == values[0].get(name) for x in values)
+        if name not in OUTCOME and all(each.get(name) == values[0].get(name) for each in values)
     }  # fmt: skip
-    kept = [field for field in schema if field.name not in constants]
+    kept = [field for field in schema if all_columns or field.name not in constants]
     return pa.schema(kept, {CONSTANTS: json.dumps(constants).encode()})
 
 
-def _one_value(table: Any) -> dict[str, Any]:
-    """Return the value of each column that has only one."""
-    import pyarrow as pa
-
-    first = table.slice(0, 1).to_pylist()[0]
-    return {
-        name: x for name, x in first.items()
-        if table[name].equals(pa.chunked_array([pa.array([x] * len(table), table[name].type)]))
-    }  # fmt: skip
-
-
 def _constants(file: Any) -> dict[str, Any]:
-    """Return the columns in the metadata of a file."""
+    """Return the columns with one value, which are in the metadata of a file."""
     found = json.loads((file.schema_arrow.metadata or {}).get(CONSTANTS, b"{}"))
     if not isinstance(found, dict):
         raise ValueError("its constant columns are not a table")
-    return {name: x for name, x in found.items() if name not in file.schema_arrow.names}
+    return found
 
 
 def _tables(path: Path, schema: Any) -> Iterator[Any]:
@@ -227,12 +214,11 @@ def _tables(path: Path, schema: Any) -> Iterator[Any]:
     same = _constants(file)
     for k in range(file.num_row_groups):
         group = file.read_row_group(k)
-        columns = [
-            group[field.name].cast(field.type) if field.name in group.column_names
-            else pa.array([same.get(field.name)] * len(group), field.type)
-            for field in schema
-        ]  # fmt: skip
-        yield pa.table(columns, schema=schema)
+        for field in schema:
+            if field.name not in group.column_names:
+                cells = pa.array([same.get(field.name)] * len(group), field.type)
+                group = group.append_column(field, cells)
+        yield group.select(schema.names).cast(schema)
 
 
 def read(out: Path, columns: Sequence[str] = ()) -> list[dict[str, Any]]:

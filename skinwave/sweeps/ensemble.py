@@ -216,7 +216,7 @@ def ensemble(
     progress("samples", 0.0)
     work = partial(_solve, scene, keys, method)
     if workers > 1 and len(different) > FEW:
-        engine.run_all(work, different, "processes", workers, done)
+        engine.run_all(work, list(different), "processes", workers, done)
     else:
         with one_thread():
             for k, sample in enumerate(different):

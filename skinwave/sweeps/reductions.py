@@ -91,9 +91,9 @@ def shared_meshes(
     """
     progress("reduce bodies", 0.0)
     hardest: dict[Scene, DesignPoint] = {}
-    for point in sorted(runs, key=_highest_line, reverse=True):
-        if subject := reduced_scene(point, options):
-            hardest.setdefault(subject, point)
+    reduced = [(subject, point) for point in runs if (subject := reduced_scene(point, options))]
+    for subject, point in sorted(reduced, key=lambda run: _highest_line(run[1]), reverse=True):
+        hardest.setdefault(subject, point)
 
     def meshes_of(work: Callable[..., Mesh], items: Sequence[Any]) -> list[Mesh]:
         made: dict[int, Mesh] = {}

@@ -114,7 +114,9 @@ class Sweep:
         }  # fmt: skip
 
         def write(rows: Iterable[dict[str, Any]]) -> None:
-            numbered = [{"index": index[row["key"]]} | constant | row for row in rows]
+            numbered: list[dataset.Row] = [
+                {"index": index[row["key"]]} | constant | row for row in rows
+            ]
             if numbered:
                 dataset.append(self.folder, numbered)
             for row in numbered:

@@ -81,7 +81,7 @@ def test_columns_of_a_known_motion():
     # The squared pressure has a line at 2 f, a quarter of that at f.
     np.testing.assert_allclose(row["kernel_shape_misfit"], np.sqrt(1 / 17), rtol=2e-3)
     assert (row["f_AM_hz"], row["sensation_line"], row["peak_memory_gib"]) == (f, "f_AM", 3)
-    known = input_columns(DesignPoint(varied={}, keys={}, text="", scene=scene))
+    known = input_columns(DesignPoint(varied={}, text="", scene=scene))
     # Of an incompressible half-space it is 0.955 times the speed of shear waves.
     assert known["rayleigh_speed_m_per_s"] == pytest.approx(0.955 * 5, rel=2e-3)
     assert (known["probe_x_mm"], known["probe_y_mm"]) == ([0, 5, 10], [0, 0, 0])
