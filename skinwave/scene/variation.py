@@ -59,8 +59,8 @@ Variation = Choice | Spread
 class DesignPoint:
     """One run of a sweep: its `varied` keys and the scene, or an `error` instead.
 
-    `text` is that of the scene's file. `before` is the scene without factors on all moduli or losses
-    of a material.
+    `text` is that of the scene's file. `before` is the scene without factors on all moduli or
+    losses of a material.
     """
 
     varied: Mapping[str, Any]

@@ -149,7 +149,10 @@ def address(monkeypatch):
     path = os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])
     monkeypatch.setenv("PYTHONPATH", path)  # workers find this checkout, whatever is installed
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+    no_cache = {"SKINWAVE_CACHE": ""}  # workers that share no folder with this process
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, env=no_cache
+    ) as cluster:
         yield cluster.scheduler_address
 
 
@@ -166,6 +169,34 @@ def test_processes_and_a_cluster_give_the_same_table(scene, address):
     for name in ("peak_um", "rms_um", "expected_error"):
         first, second = (np.array([row[name] for row in rows], float) for rows in (here, there))
         np.testing.assert_allclose(first, second, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_with_another_version_is_refused_and_one_that_ends_is_named(
+    tmp_path, monkeypatch
+):
+    from distributed import LocalCluster
+
+    (tmp_path / "scipy-9.9.9.dist-info").mkdir()
+    (tmp_path / "scipy-9.9.9.dist-info/METADATA").write_text(
+        "Metadata-Version: 2.1\nName: scipy\nVersion: 9.9.9\n"
+    )
+    own = os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])
+    other = f"{tmp_path}{os.pathsep}{own}"
+    small = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(**small, env={"PYTHONPATH": other}) as cluster:
+        address = cluster.scheduler_address
+        with pytest.raises(ValueError, match=r"scipy is 9\.9\.9 on the Dask worker tcp"):
+            engine.worker_count(address)
+        with pytest.raises(ValueError, match=r"install the same version"):
+            engine.run_all(abs, [-1], address, 1, {}.update)
+    monkeypatch.setenv("PYTHONPATH", own)
+    with LocalCluster(**small) as cluster:
+        address = cluster.scheduler_address
+        assert engine.worker_count(address) == 1
+        with pytest.raises(ValueError, match=f"{address} has ended"):
+            engine.run_all(abs, [-1, -2, -3], address, 1, lambda found: cluster.close())
 
 
 def test_figures_have_units_and_names_in_every_format(scene, capsys, refused):
