@@ -126,7 +126,7 @@ def merge(out: Path, *, all_columns: bool = False, most_bytes: int = 64_000_000)
     files, pieces = _files(out)
     with _readable(out):
         schema = _common_schema([*files, *pieces], all_columns)
-        known = {row[KEY] for path in files for row in _open(path).read([KEY]).to_pylist()}
+        known = {row[KEY] for row in _rows(files, (KEY,))}
         added = chain.from_iterable(_tables(path, schema) for path in pieces)
         size = most_bytes // 4
         new = _row_groups(added, known, size)
@@ -226,19 +226,23 @@ def read(out: Path, columns: Sequence[str] = ()) -> list[dict[str, Any]]:
 
     Raises a ValueError if there are none.
     """
-    rows: dict[str, Row] = {}
     with _readable(out):
-        for path in chain(*_files(out)):
-            file = _open(path)
-            same = _constants(file)
-            names = [name for name in file.schema_arrow.names if not columns or name in columns]
-            for row in file.read(names).to_pylist():
-                rows.setdefault(row[KEY], same | row)
+        rows = {row[KEY]: row for row in _rows(chain(*_files(out)), columns)}
     if not rows:
         raise ValueError(f"{out} contains no rows of a sweep; name the folder of a sweep")
     every = columns or dict.fromkeys(chain((INDEX, KEY), *rows.values()))
     ordered = sorted(rows.values(), key=lambda row: row[INDEX])
     return [{name: row.get(name) for name in every} for row in ordered]
+
+
+def _rows(paths: Iterable[Path], columns: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield the rows of files, with all columns or those asked for."""
+    for path in paths:
+        file = _open(path)
+        same, names = _constants(file), file.schema_arrow.names
+        names = [name for name in names if not columns or name in columns]
+        for row in file.read(names).to_pylist():
+            yield same | row
 
 
 def failures_of(rows: Iterable[Row]) -> dict[str, str]:
@@ -249,12 +253,7 @@ def failures_of(rows: Iterable[Row]) -> dict[str, str]:
 def names(out: Path) -> dict[str, int]:
     """Return the index of each row by its name."""
     with _readable(out):
-        found = [_open(path).read([KEY, INDEX]) for path in chain(*_files(out))]
-    return {
-        name: index
-        for table in found
-        for name, index in zip(table[KEY].to_pylist(), table[INDEX].to_pylist(), strict=True)
-    }
+        return {row[KEY]: row[INDEX] for row in _rows(chain(*_files(out)), (KEY, INDEX))}
 
 
 def number_rows(wanted: Iterable[str], earlier: Mapping[str, int]) -> dict[str, int]:
