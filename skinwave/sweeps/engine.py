@@ -166,9 +166,13 @@ def _executor(
 def _threads(client: Any, known: set[str]) -> int:
     """Return the number of threads of all workers, at least 1, and add the workers to those known.
 
-    Raises a ValueError if a new worker has another version of a package.
+    Raises a ValueError if a new worker has another version of a package, and a CancelledError if
+    the scheduler has ended.
     """
-    threads: dict[str, int] = client.nthreads()
+    try:
+        threads: dict[str, int] = client.nthreads()
+    except OSError:
+        raise CancelledError from None
     new = sorted(threads.keys() - known)
     for name in ("skinwave", "numpy", "scipy") if new else ():
         own, found = version(name), client.run(version, name, workers=new, on_error="return")

@@ -79,19 +79,21 @@ def reduced_scene(point: DesignPoint, options: SolveOptions) -> Scene | None:
 
 
 def shared_meshes(
-    runs: Iterable[DesignPoint],
+    runs: Mapping[str, DesignPoint],
     options: SolveOptions,
     count: int,
     distribute: Distribute,
     progress: Progress,
-) -> dict[Scene, Mesh]:
-    """Reduce each body of the runs once, families of bodies together, and return their meshes.
+) -> dict[str, Mesh | None]:
+    """Reduce each body of the runs once, families of bodies together, and return the mesh of each
+    run, those on one body together. Runs whose model reduces no body have none.
 
     `distribute` calls a function of items on `count` workers.
     """
     progress("reduce bodies", 0.0)
+    subjects = {name: reduced_scene(point, options) for name, point in runs.items()}
+    reduced = [(subject, runs[name]) for name, subject in subjects.items() if subject]
     hardest: dict[Scene, DesignPoint] = {}
-    reduced = [(subject, point) for point in runs if (subject := reduced_scene(point, options))]
     for subject, point in sorted(reduced, key=lambda run: _highest_line(run[1]), reverse=True):
         hardest.setdefault(subject, point)
 
@@ -115,7 +117,11 @@ def shared_meshes(
     }
     alone = {subject: point.scene for subject, point in hardest.items() if subject not in meshes}
     own_meshes = meshes_of(mesh_of_body, list(alone.values()))
-    return meshes | dict(zip(alone, own_meshes, strict=True))
+    meshes |= dict(zip(alone, own_meshes, strict=True))
+    groups: dict[Scene | None, list[str]] = {}
+    for name, each in subjects.items():
+        groups.setdefault(each, []).append(name)
+    return {n: meshes[each] if each else None for each, names in groups.items() for n in names}
 
 
 def _highest_line(point: DesignPoint) -> float:

@@ -22,7 +22,6 @@ from skinwave.sweeps.reductions import (
     Mesh,
     model_of,
     on_mesh,
-    reduced_scene,
     shared_meshes,
 )
 from skinwave.system.effort import Progress, silent
@@ -133,29 +132,17 @@ class Sweep:
                 {"key": name} | input_columns(point)
                 for name, point in missing.items() if name not in runs
             ])  # fmt: skip
-            meshes = shared_meshes(runs.values(), self.options, count, distribute, self.progress)
+            meshes = shared_meshes(runs, self.options, count, distribute, self.progress)
             write([])
             work = partial(_row, self.options, self.assessed)
-            distribute(work, self._items(runs, meshes), lambda rows: write(rows.values()))
+            items = [(name, runs[name], mesh) for name, mesh in meshes.items()]
+            distribute(work, items, lambda rows: write(rows.values()))
         except KeyboardInterrupt:
             interrupted = True
         return SweepOutcome(
             planned=len(wanted), earlier=len(wanted) - len(missing), **tally,
             interrupted=interrupted, seconds=time.perf_counter() - started,
         )  # fmt: skip
-
-    def _items(
-        self, runs: Mapping[str, DesignPoint], meshes: Mapping[Scene, Mesh]
-    ) -> list[tuple[str, DesignPoint, Mesh | None]]:
-        """Return the arguments of each run, those on one body together."""
-        groups: dict[Scene | None, list[str]] = {}
-        for name, point in runs.items():
-            groups.setdefault(reduced_scene(point, self.options), []).append(name)
-        return [
-            (name, runs[name], meshes[solid] if solid else None)
-            for solid, members in groups.items()
-            for name in members
-        ]
 
 
 def _row(

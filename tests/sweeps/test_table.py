@@ -182,16 +182,17 @@ def test_a_cluster_with_another_version_is_refused_and_one_that_ends_is_named(
     (tmp_path / "scipy-9.9.9.dist-info/METADATA").write_text(
         "Metadata-Version: 2.1\nName: scipy\nVersion: 9.9.9\n"
     )
+    other = tmp_path / "other.py"
+    other.write_text(f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n")
     own = os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])
-    other = f"{tmp_path}{os.pathsep}{own}"
+    monkeypatch.setenv("PYTHONPATH", own)
     small = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
-    with LocalCluster(**small, env={"PYTHONPATH": other}) as cluster:
+    with LocalCluster(**small, preload=[str(other)]) as cluster:
         address = cluster.scheduler_address
         with pytest.raises(ValueError, match=r"scipy is 9\.9\.9 on the Dask worker tcp"):
             engine.worker_count(address)
         with pytest.raises(ValueError, match=r"install the same version"):
             engine.run_all(abs, [-1], address, 1, {}.update)
-    monkeypatch.setenv("PYTHONPATH", own)
     with LocalCluster(**small) as cluster:
         address = cluster.scheduler_address
         assert engine.worker_count(address) == 1
