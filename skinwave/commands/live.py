@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
         output_file(options.out, overwrite=options.overwrite, inputs=inputs) as file,
         progress_of(options) as progress,
     ):
-        data = data_of(scenes, progress, test=not options.no_selftest)
+        data = data_of(scenes, progress, **({"tests": 0} if options.no_selftest else {}))
         size = file.write(page(data).encode())
     bodies = [record["title"] for record in data["bodies"]]
     summary = {"out": str(options.out), "bytes": size, "bodies": bodies}

@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     scenes = [read_scene(path) for path in options.scenes]
     with Server(options.port, base) as server, tempfile.TemporaryDirectory() as private:
         with progress_of(options) as progress:
-            data = data_of(scenes, progress, bodies=QUICK, test=False)
+            data = data_of(scenes, progress, bodies=QUICK, tests=0)
         warn(with_failures(data["failures"], []))
         server.show(data)
         say(f"skinwave: {server.address} (press Ctrl-C to stop)", sys.stderr)

@@ -1,17 +1,20 @@
 """Answers to the requests of a served page: changed bodies, scenes and measurements."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from skinwave.live.packs import pack_of
 from skinwave.live.records import body_of, dispersion_of, record_of, with_changes
-from skinwave.live.values import control_values
-from skinwave.scene.scene import BODIES
+from skinwave.live.values import control_values, tacton_values
+from skinwave.scene.scene import BODIES, Scene
 from skinwave.system.effort import Progress, silent
+
+_T = TypeVar("_T")
 
 MOST_VALUES = 2_000_000  # of a measurement for a page
 
@@ -43,13 +46,19 @@ def dispersion_answer(content: bytes) -> dict[str, Any]:
 
 
 def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict[str, Any]:
-    """Return the values of a scene file and the record of its body."""
-    from skinwave.scene.file import loads
+    """Return the values of a scene file and the record of its body; of a pattern, which has no
+    body, the values of its Tacton.
+    """
+    from skinwave.patterns import Options, read_pattern
 
-    try:
-        scene = loads(content.decode("utf-8"))
-    except UnicodeDecodeError:
-        raise ValueError(f"{name or 'The file'} is not UTF-8 text. Give a scene file.") from None
+    def read(file: Path) -> Scene:
+        return read_pattern(file, Options())[0]
+
+    if (suffix := Path(name).suffix.lower()) == ".adaptics":
+        scene = _from_file(name, suffix, content, read)
+        control_values(scene, "")  # refuses what the page cannot set
+        return {"values": tacton_values(scene.tacton)}
+    scene = _from_file(name or "The file", ".toml", content, read)
     known = (name for name, body in BODIES.items() if body == scene.body)
     own = next(known, f"own-{scene.body.kind}")
     values = control_values(scene, own)
@@ -64,13 +73,7 @@ def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
     """
     from skinwave.measure.reading import read
 
-    with TemporaryDirectory() as folder:
-        file = Path(folder, f"measured{Path(name).suffix.lower()}")
-        file.write_bytes(content)
-        try:
-            measured = read(file)
-        except ValueError as error:
-            raise ValueError(str(error).replace(str(file), name or "the file")) from None
+    measured = _from_file(name or "the file", Path(name).suffix.lower(), content, read)
     mean = measured.values.mean(axis=0)
     if mean.size > MOST_VALUES:
         raise ValueError(
@@ -86,3 +89,14 @@ def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
         return curves | {"frequencies": measured.frequencies.tolist(), "amplitudes": amplitudes}
     times = measured.times - measured.times[0]
     return curves | {"times": times.tolist(), "values": mean.real.T.tolist()}
+
+
+def _from_file(name: str, suffix: str, content: bytes, read: Callable[[Path], _T]) -> _T:
+    """Return what a reader of files makes of a content; its errors name the file `name`."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder, f"sent{suffix}")
+        file.write_bytes(content)
+        try:
+            return read(file)
+        except ValueError as error:
+            raise ValueError(str(error).replace(str(file), name)) from None

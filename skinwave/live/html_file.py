@@ -25,7 +25,6 @@ from skinwave.system.templates import render
 
 TITLE = "skinwave: waves in skin and paper under mid-air ultrasound haptics"
 DEFAULT_BODIES = ("skin-slab", "paper-sheet", "palm")
-TESTS = 60  # random Tactons of the self-test, of all bodies together
 
 
 def page(data: Mapping[str, Any], title: str = TITLE) -> str:
@@ -33,7 +32,7 @@ def page(data: Mapping[str, Any], title: str = TITLE) -> str:
     static = resources.files("skinwave") / "static"
     script = "\n" + bundle(static, "page.js")
     return render(
-        "live.html", title=title, script=script,
+        "live.html", title=title, script=script, worker=bundle(static, "worker.js"),
         css=(static / "page.css").read_text(encoding="utf-8"),
         data=json_for_script(data), policy=policy(script, served=bool(data.get("api"))),
         failed=failure_text(data.get("failures", {})),
@@ -56,12 +55,12 @@ def data_of(
     progress: Progress = silent,
     *,
     bodies: Sequence[str] = DEFAULT_BODIES,
-    test: bool = True,
+    tests: int = 60,
 ) -> dict[str, Any]:
     """Return the data of a page of scenes at their probes nearest to the path, or of preset bodies,
-    as a dict for JSON. `test` adds the data of the self-test. A body that fails is left out, with
-    its reason in "failures". Raises ValueError if all fail, or if no control of the page can set a
-    scene.
+    as a dict for JSON. The self-test has at least `tests` random Tactons. A body that fails is left
+    out, with its reason in "failures". Raises ValueError if all fail, or if no control of the page
+    can set a scene.
     """
     scenes = [
         replace(scene, probes=tuple(sorted(scene.probes, key=partial(_distance, scene))))
@@ -69,7 +68,7 @@ def data_of(
     ]
     names = unique_names([scene.body for scene in scenes] or [BODIES[name] for name in bodies])
     own = [values.control_values(scene, names[scene.body]) for scene in scenes]
-    records, tests, failures = [], [], dict[str, str]()
+    records, tested, failures = [], [], dict[str, str]()
     for body, name in names.items():
         prefix = f"{title_of(body)}: " if len(names) > 1 else ""
 
@@ -79,9 +78,9 @@ def data_of(
         with or_failed(failures, title_of(body)):
             pack = pack_of(body, on_body)
             records.append(record_of(body, pack, name))
-            if test:
+            if count := -(-tests // len(names)):
                 lowest = pack["lowest_height_mm"] / 1e3
-                tests += selftest(body, name, -(-TESTS // len(names)), lowest, pack["error"])
+                tested += selftest(body, name, count, lowest, pack["error"])
     if not records:
         raise ValueError("; ".join(dict.fromkeys(failures.values())))
     known = {record["name"] for record in records}
@@ -90,7 +89,7 @@ def data_of(
     return {
         "bodies": records, "start": own[0] if own else {"body": records[0]["name"]},
         "presets": _own_presets(scenes, own) + values.presets(),
-        "selftest": tests, "api": None, "failures": failures,
+        "selftest": tested, "api": None, "failures": failures,
     }  # fmt: skip
 
 
@@ -101,7 +100,7 @@ def comparison_page(scenes: Iterable[Scene]) -> tuple[str, dict[str, str]]:
     quick = sorted(filter(_is_quick, scenes), key=lambda scene: not scene.body.is_skin)
     if not quick:
         return "", {}
-    data = data_of(quick, test=False)
+    data = data_of(quick, tests=6)
     return page(data), {f"live page of {name}": why for name, why in data["failures"].items()}
 
 

@@ -38,7 +38,7 @@ EXAMPLES = {
 
 def presets() -> list[dict[str, Any]]:
     """Return the paper's 15 Tactons and the examples as records of title and values."""
-    paper = {tacton_title(tacton): _tacton_values(tacton) for _, tacton in tactons()}
+    paper = {tacton_title(tacton): tacton_values(tacton) for _, tacton in tactons()}
     examples = {title: PLAIN | values for title, values in EXAMPLES.items()}
     return [{"title": title, "values": own} for title, own in (paper | examples).items()]
 
@@ -74,7 +74,7 @@ def control_values(scene: Scene, body: str) -> Values:
             f"The live page has no control for {' or '.join(missing)}. Use skinwave run."
         )
     x, y = (_round(1e3 * value) for value in scene.probes[0])
-    return _tacton_values(tacton) | {
+    return tacton_values(tacton) | {
         "body": body, "height": _round(1e3 * pressure.height), "drive": str(pressure.drive),
         "profile": pressure.profile, "peak": _round(pressure.peak_pressure),
         "modulation": _round(100 * pressure.depth_of_modulation),
@@ -82,7 +82,8 @@ def control_values(scene: Scene, body: str) -> Values:
     }  # fmt: skip
 
 
-def _tacton_values(tacton: Tacton) -> Values:
+def tacton_values(tacton: Tacton) -> Values:
+    """Return the values of the controls of a Tacton, without those of its focus and point."""
     path, rhythm = tacton.trajectory, tacton.rhythm
     even = np.allclose(sorted(tacton.foci), even_phases(len(tacton.foci)))
     phases = "" if even else ", ".join(f"{100 * phase:g}" for phase in tacton.foci)

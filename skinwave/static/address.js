@@ -10,16 +10,19 @@ export function toAddress(values, starts = STARTS) {
   }).join("&");
 }
 
-/** Values {values, refused} in the text of an address, with a sentence for each part that is refused. */
+/** Values {values, refused} in the text of an address; `refused` are sentences about what is ignored. */
 export function fromAddress(text, starts = STARTS) {
-  const values = { ...starts }, refused = [];
+  const values = { ...starts }, ignored = [];
   for (const [key, given] of new URLSearchParams(text.replace(/^[#?]/, ""))) {
     try {
       values[key] = check(key, given);
     } catch (error) {
-      refused.push(`This part of the address is ignored. ${error.message}`);
+      ignored.push({ part: `${key}=${given}`, why: error.message });
     }
   }
+  const named = ignored.map(({ part }) => part).join(", ");
+  const refused = ignored.length > 1 ? [`These parts of the address are ignored: ${named}.`]
+    : ignored.map(({ why }) => `This part of the address is ignored. ${why}`);
   return { values, refused };
 }
 

@@ -15,7 +15,7 @@ const TOLERANCE = 0.05; // of the error of a sheet's lines by its stretching
  */
 export function respond(values, body) {
   const load = loadOf(values, body), x = values.x / 1e3, y = values.y / 1e3;
-  const kernel = respondOfKernel(load), waves = body.respond(load);
+  const kernel = respondOfKernel(load), waves = body.motion(load);
   const [kernelAt, wavesAt] = [kernel.at(x, y), waves.at(x, y)];
   return { values, body, load, x, y, kernel, waves, kernelAt, wavesAt,
     level: body.is_skin ? levelOf(waves.f, wavesAt, "m") : null,

@@ -10,25 +10,20 @@ const SIDE = MAP_LINE.length;
 
 const BODIES = { radial: RadialBody, modal: ModalBody, poles: PoleBody };
 
-/** Open the body of a record: its fields, with `respond(load)` and its `shape`. */
-export function openBody(record) {
-  const { pack, ...rest } = record, body = new BODIES[pack.kind](unpacked(pack));
-  const respond = (load) => {
-    const motion = body.motion(load);
-    return Object.assign(motion, { surface: () => surfaceMotion(body, motion) });
-  };
-  return Object.assign(body, rest, { shape: shapeOf(body), respond });
+/** Open the body of a record: its fields, with its `shape` and `motion(load)`. */
+export function openBody({ pack, ...rest }) {
+  const body = new BODIES[pack.kind](unpacked(pack));
+  return Object.assign(body, rest, { shape: shapeOf(body) });
 }
 
-/** Upward motion {re, im} (l, n) in metre of the points of a body's shape. */
-function surfaceMotion(body, motion) {
-  const { at } = body.shape, n = at.length, map = motion.onGrid(MAP_LINE, MAP_LINE);
-  const upwards = (values) => {
-    const out = new Float32Array(motion.f.length * n);
+/** Upward motion {f, re, im} (l, n) in metre of the points of a shape, from a map. */
+export function surfaceMotion({ at }, map) {
+  const n = at.length, upwards = (values) => {
+    const out = new Float32Array(map.f.length * n);
     for (let k = 0; k < out.length; k++) out[k] = -values[Math.floor(k / n) * SIDE * SIDE + at[k % n]];
     return out;
   };
-  return { re: upwards(map.re), im: upwards(map.im) };
+  return { f: map.f, re: upwards(map.re), im: upwards(map.im) };
 }
 
 /**

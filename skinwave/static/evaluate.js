@@ -1,7 +1,7 @@
 // Evaluation of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
 
 import { fourier, largestOf } from "./numeric.js";
-import { strongLines, synthesise } from "./surface3d.js";
+import { strongLines } from "./surface3d.js";
 import { drawingFrequency, jumps, levelFactor, loadLines, pathSamples, positionOf, rhythmLevel,
   rhythmPeriod } from "./load.js";
 
@@ -76,10 +76,9 @@ export function levelOf(f, at, unit = "m") {
 export const MAP_LINE = Float64Array.from({ length: SIDE }, (_, k) => HALF * (2 * k / (SIDE - 1) - 1));
 
 /**
- * Map of a motion {rms, level} while a pulse is on, by row y and column x; NaN off the body. `rms` is about
- * the mean; `level` in dB is that of the highest line. `largest` (l,) are the amplitudes of lines where they
- * are largest, `strongest` is the place [x, y] in metre of the largest `rms`, and `at(t, out)` writes the
- * steady motion about the mean at a time in s.
+ * Map of a motion {rms, level, f, re, im} while a pulse is on, by row y and column x; NaN off the body. `rms`
+ * is about the mean; `level` in dB is that of the highest line; re, im (l * n) are the lines f, of which
+ * `strongLines` gives those that are drawn. `strongest` is the place [x, y] in metre of the largest `rms`.
  */
 export function mapOf(motion) {
   const { re, im } = motion.onGrid(MAP_LINE, MAP_LINE), places = SIDE * SIDE;
@@ -96,10 +95,9 @@ export function mapOf(motion) {
     level[p] = Number.isNaN(rms[p]) ? NaN : 10 * Math.log10(Math.max(level[p], 1e-20));
     rms[p] = Math.sqrt(rms[p]);
   }
-  const strong = strongLines({ f: motion.f, re, im }), top = Math.max(0, rms.indexOf(largestOf(rms)));
-  return { rms, level, largest: strong.largest, crest: strong.crest,
-    strongest: [MAP_LINE[top % SIDE], MAP_LINE[Math.floor(top / SIDE)]],
-    at: (t, out) => synthesise(strong, { re, im }, t, out) };
+  const top = Math.max(0, rms.indexOf(largestOf(rms))), { f } = motion;
+  return { rms, level, f, re, im, ...strongLines({ f, re, im }),
+    strongest: [MAP_LINE[top % SIDE], MAP_LINE[Math.floor(top / SIDE)]] };
 }
 
 /** Largest value of the `rate`-th derivative of a motion at a place within the first `EXAMINED` s. */

@@ -146,12 +146,12 @@ export function spectrumPlot(answer, { pinned, measured, highest, log, scale }) 
     curves.push(stems("pinned", "y2", nameOfA(factor), pinned.waves.f, amplitudes, 0, factor * moves));
   }
   const axes = { y: { label: "Pa", role: "kernel" }, y2: { label: unit, role: "waves" } };
-  const ofMap = ({ f }, name, { per: scaled, rate: order }) => (answer.maps?.[name].largest ?? []).reduce(
+  const ofMap = ({ per: scaled, rate: order }, { f, largest } = { f: [], largest: [] }) => largest.reduce(
     (most, v, l) => Math.max(most, scaled * (2 * Math.PI * f[l]) ** order * v || 0), 0);
   for (const [axis, each] of Object.entries(axes)) {
     const drawn = curves.filter((curve) => curve.axis === axis).map(({ y }) => largestOf(y));
-    const tallest = Math.max(...drawn, mean * (axis === "y" ? ofMap(kernel, "kernel", PRESSURE)
-      : ofMap(waves, "waves", { per, rate })));
+    const tallest = Math.max(...drawn, mean * (axis === "y" ? ofMap(PRESSURE, answer.maps?.kernel)
+      : ofMap({ per, rate }, answer.maps?.waves)));
     each.range = [0, scale(`spectrum ${axis} ${name}`, 1.2 * tallest)];
   }
   if (measured?.quantity === name) {
@@ -176,7 +176,7 @@ export function spectrumPlot(answer, { pinned, measured, highest, log, scale }) 
 
 /** Plot of the phase speeds of a body's waves with the lines of the load. */
 export function dispersionPlot(answer, highest) {
-  const { body: { dispersion }, load: { path }, waves } = answer;
+  const { body, load: { path }, waves } = answer, { dispersion } = body;
   if (!dispersion) {
     const text = body.isRequested && !body.hasFailed ? "The dispersion curves are being computed."
       : "Dispersion curves are not available for this body.";

@@ -1,6 +1,6 @@
 // Maps of a surface as SVG. Values are by place, row y and column x ascending.
 
-import { largestOf } from "./numeric.js";
+import { cached, largestOf } from "./numeric.js";
 import { SEQUENTIAL, SIGNED, TABLE_LENGTH } from "./palette.js";
 import { escaped, withUnit } from "./text.js";
 
@@ -8,6 +8,7 @@ const REACH = 0.044; // m: half the width of a map
 const MARGIN = { left: 32, right: 10, top: 20, bottom: 50 }; // px around the map for text, ticks and bar
 const TICKS = [-40, -20, 0, 20, 40]; // mm
 const INFLUENCED = -20; // dB re the largest of the kernel: edge of its region
+const GRASP = 2.5e-3; // m within which the pointer takes a corner
 const KEY_STEP = 1e-3, LONG_KEY_STEP = 5e-3; // m: step of an arrow key, alone and with shift
 const COLOURS = { path: "#56b4e9", threshold: "#ff6fd0", point: "#d55e00" };
 const states = new WeakMap(); // by element: options, box, image, hovered place
@@ -40,12 +41,14 @@ function paint(canvas, options) {
 
 const sideOf = ({ rms }) => Math.round(Math.sqrt(rms.length)); // places along a side of a map
 
+const bars = new Map();
+
 /** Image of the colours of a scale, left to right. */
-function bar(table) {
+const bar = (table) => cached(bars, table, () => {
   const made = picture(TABLE_LENGTH, 1);
   made.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(table), TABLE_LENGTH, 1), 0, 0);
   return made.toDataURL();
-}
+});
 
 /** Square of the map in an element of this size, in pixels. */
 function boxIn(width, height) {
@@ -119,6 +122,9 @@ function inside(options, { box, image: url }) {
   if (options.level) drawZeros(options.level, { colour: COLOURS.threshold, width: 1.8 });
   for (const each of path) {
     if (each.length > 1) parts.push(line(each.map(at), { colour: COLOURS.path, width: 1.8 }));
+  }
+  for (const [x, y] of (options.corners ?? []).map(at)) {
+    parts.push(rectangle(x - 4, y - 4, 8, 8, `fill="#fff" stroke="${COLOURS.path}" stroke-width="1.5"`));
   }
   parts.push(`<g class="foci">${fociMarkup(options, box)}</g>`);
   if (point) {
@@ -247,7 +253,8 @@ export function moveMap(svg, { rms, foci }) {
  *   largest: end of the scale; decibel: range of the scale in dB below `largest`, or 0 if it is linear;
  *   signed: whether the scale is red and blue about 0; level: values (n * n) with a contour at 0;
  *   influenced: the kernel's values (n * n) with a contour at -20 dB; path: paths of points [x, y] in metre;
- *   foci: places [x, y] in metre; point: [x, y] in metre; title; hatched: why the values are not valid;
+ *   foci: places [x, y] in metre; corners: places [x, y] in metre that can be dragged; point: [x, y] in
+ *   metre; title; hatched: why the values are not valid;
  *   moving: whether `moveMap` will show other values at once
  */
 export function drawMap(svg, options) {
@@ -266,9 +273,10 @@ export function drawMap(svg, options) {
 
 /**
  * Let pointer and arrow keys select points of a map, and show the value under the pointer. Calls
- * `onPoint(x, y)` in metre.
+ * `onPoint(x, y)` in metre, or `onCorner(k, x, y)` while corner k of the path is dragged.
  */
-export function mapControls(svg, onPoint) {
+export function mapControls(svg, onPoint, onCorner) {
+  let held = -1; // corner that is dragged
   svg.tabIndex = 0;
   svg.setAttribute("role", "application");
   svg.style.touchAction = "pan-y"; // moving a finger up scrolls the page
@@ -286,10 +294,15 @@ export function mapControls(svg, onPoint) {
     drawMap(svg, state.options);
   };
   const select = (event) => {
-    if (states.has(svg)) onPoint(...bounded(place(event).map((v) => Math.round(1e3 * v) / 1e3)));
+    if (!states.has(svg)) return;
+    const at = bounded(place(event).map((v) => Math.round(1e3 * v) / 1e3));
+    if (held < 0) onPoint(...at); else onCorner(held, ...at);
   };
+  const cornerAt = ([x, y]) => (states.get(svg)?.options.corners ?? []).findIndex(
+    ([own, other]) => Math.hypot(own - x, other - y) < GRASP);
   svg.addEventListener("pointerdown", (event) => {
     svg.setPointerCapture(event.pointerId);
+    held = cornerAt(place(event));
     select(event);
   });
   svg.addEventListener("pointermove", (event) => {

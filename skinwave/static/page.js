@@ -2,7 +2,8 @@
 
 import { addressOf, createHistory, readAddress } from "./address.js";
 import { NUMBERS_OF_MAPS, mapsOf, respond as respondTo } from "./answer.js";
-import { openBody } from "./bodies.js";
+import { mapsBeside } from "./beside.js";
+import { openBody, surfaceMotion } from "./bodies.js";
 import { buildControls } from "./controls.js";
 import { MAP_LINE, levelOver } from "./evaluate.js";
 import { filmOf } from "./film.js";
@@ -16,9 +17,10 @@ import { createPlot, keptScales, niceTop } from "./plots.js";
 import { offerSaves } from "./saving.js";
 import { runSelftest } from "./selftest.js";
 import { request, sendFile } from "./server.js";
+import { synthesise } from "./surface3d.js";
 import { comparison, linesTable, tiles } from "./tables.js";
 import { escaped, rounded } from "./text.js";
-import { LABELS, STARTS, check, fitPaths, loadOf, nameBodies } from "./values.js";
+import { LABELS, STARTS, check, cornersOf, fitPaths, loadOf, nameBodies, withCorner } from "./values.js";
 import { openView } from "./view3d.js";
 
 const data = JSON.parse(document.getElementById("data").textContent);
@@ -28,7 +30,6 @@ const all = (selector) => [...document.querySelectorAll(selector)];
 const LOOKS = ["maps", "motion", "difference", "3d"];
 const SPANS = ["automatic", "last 60 ms", "all"];
 const PLAYED = 5, SHORTEST = 0.06; // s in which a part of the motion is played, and its least length
-const FEWER = 3; // curves per map while a control moves
 const SLICE = 30; // ms of slow work, after which the page draws
 const STEPS = { undo: -1, redo: 1 };
 const PAUSE = 300; // ms without a move, after which slow results are computed
@@ -39,9 +40,11 @@ const view = { look: "maps", tab: "lines", span: "automatic", highest: "600", ov
 const errors = new Map(); // sentences by control or file
 const scale = keptScales();
 let values = starts, answer = null, pinned = null, measured = null, history = null, controls = null;
-let curvesDue = 0, mapsDue = 0, levelsDue = 0, announcementDue = 0, moving = false;
-let levels = null, solid = null, solidKernel = null, solidAnswer = null, skipped = 0;
+let curvesDue = 0, levelsDue = 0, announcementDue = 0, moving = false;
+let levels = null, solid = null, solidKernel = null, solidMaps = null;
 let playing = 0, clock = 0, editing = null, notice = "";
+
+const askForMaps = mapsBeside($("worker").textContent, takeMaps);
 
 /** The surface of maps as a flat sheet for pictures of the kernel in three dimensions, in mm. */
 const flatSheet = (() => {
@@ -131,7 +134,7 @@ function showMessages() {
   $("warnings").textContent = warnings.join(" ");
 }
 
-/** Numbers of the latest maps of the same body, shown until new maps are there, a frame later. */
+/** Numbers of the latest maps of the same body, shown until new maps are there. */
 function numbersOfMaps() {
   if (answer?.body !== bodyOf(values.body)) return {};
   return Object.fromEntries(NUMBERS_OF_MAPS.map((key) => [key, answer[key]]));
@@ -155,7 +158,7 @@ function showCurves() {
   $("commanded-note").textContent = `${values.drive.replaceAll("_", " ")}, ${rounded(load.duration)} s`;
   showTiles();
   showPane();
-  if (!moving || skipped++ % FEWER === 0) mapsDue ||= requestAnimationFrame(showMaps);
+  askForMaps(answer, recordOf(answer.body.name));
   clearTimeout(levelsDue);
   levels = levels?.key === keyOfLevels() ? levels : null;
   if (view.tab === "level" && !levels) levelsDue = setTimeout(computeLevels, PAUSE);
@@ -178,11 +181,12 @@ function drawnAt() {
   return path.drawn ?? drawingFrequency(path);
 }
 
-function showMaps() {
-  mapsDue = 0;
+/** Take maps and their numbers; those of another body are old. */
+function takeMaps(maps, { body }) {
+  if (body !== answer.body) return;
   const keyOf = ({ invalid, peaks = {} }) => [invalid ?? "", ...Object.values(peaks).map(niceTop)].join();
   const before = keyOf(answer);
-  Object.assign(answer, mapsOf(answer));
+  Object.assign(answer, maps);
   if (keyOf(answer) !== before) showPlots(); // which are hatched and scaled, too
   showMessages();
   clock %= played();
@@ -195,6 +199,10 @@ function showMaps() {
 
 const short = (title) => (title.length > 22 ? `${title.slice(0, 21)}…` : title);
 
+/** What every map shows of an answer: its path, corners, point and the kernel's region. */
+const placesOf = (own) => ({ path: pathsOf(own.load), corners: own === answer ? cornersOf(values) : [],
+  point: [own.x, own.y], influenced: own.maps.kernel.rms });
+
 /** Draw the map of the kernel, or of the waves of A, beside that of the waves. */
 function drawMaps() {
   if (!answer?.maps || view.look === "3d") return;
@@ -205,8 +213,7 @@ function drawMaps() {
   }
   const top = (name, rms) => scale(`map ${name}`, largestOf(rms), moving);
   const topOf = (own) => top(`waves ${own.body.name}`, own.maps.waves.rms);
-  const common = (own) => ({ path: pathsOf(own.load), point: [own.x, own.y], influenced: own.maps.kernel.rms,
-    decibel: view.mapDecibel });
+  const common = (own) => ({ ...placesOf(own), decibel: view.mapDecibel });
   const motion = (own, map, unit, largest) => (
     { rms: map.rms, level: own.body.is_skin ? map.level : null, unit, largest, hatched: own.invalid });
   const { maps, load, body } = answer, foci = fociAt(load, clock);
@@ -233,8 +240,8 @@ function motionMaps() {
   const a = pinned?.maps ? pinned : null;
   const b = answer, isPlaying = Boolean(playing);
   const top = (name, largest) => scale(`motion ${name}`, largest, moving);
-  const common = (own) => ({ path: pathsOf(own.load), point: [own.x, own.y], foci: fociAt(own.load, now()),
-    influenced: own.maps.kernel.rms, moving: isPlaying, hatched: own.invalid });
+  const common = (own) => ({ ...placesOf(own), foci: fociAt(own.load, now()), moving: isPlaying,
+    hatched: own.invalid });
   const topOf = (own) => top(`waves ${own.body.name}`, own.maps.waves.crest);
   const isAlike = a && factorOf(topOf(a), topOf(b)) === 1;
   const waves = (own, title) => ({ ...common(own), rms: wavesNow(own), unit: "m", signed: true, title,
@@ -265,22 +272,22 @@ function kernelNow({ kernel }) {
 /** Steady motion in metre about the mean on the map at the time of the clock, with the level of a rhythm. */
 function wavesNow({ maps, load }) {
   const values = places(), level = load.pulses ? levelFactor(load, rhythmLevel(load, now())) : 1;
-  maps.waves.at(now(), values);
+  synthesise(maps.waves, maps.waves, now(), values);
   return level === 1 ? values : values.map((v) => level * v);
 }
 
 function showSolid() {
-  if (!answer) return;
+  if (!answer?.maps) return;
   solid ??= openView($("solid"), { onTime: (t) => { clock = t; solidKernel?.seek(t); } });
   solidKernel ??= openView($("solid-kernel"), { follows: true });
-  if (solidAnswer === answer) return;
-  solidAnswer = answer;
-  const { body, kernel, waves, load, x, y } = answer, fd = drawingFrequency(load.path);
+  if (solidMaps === answer.maps) return;
+  solidMaps = answer.maps;
+  const { body, maps: { kernel, waves }, load, x, y } = answer, fd = drawingFrequency(load.path);
   const foci = fd ? (t) => fociAt(load, t) : [fociAt(load, 0)];
   const common = { path: pathsOf(load), points: [[x, y]], foci };
-  solid.show({ ...common, shape: body.shape, motion: { f: waves.f, ...waves.surface() } });
-  const { re, im } = kernel.onGrid(MAP_LINE, MAP_LINE), up = (values) => values.map((v) => -v);
-  solidKernel.show({ ...common, shape: flatSheet, motion: { f: kernel.f, re: up(re), im: up(im) }, unit: "Pa",
+  solid.show({ ...common, shape: body.shape, motion: surfaceMotion(body.shape, waves) });
+  const { f, re, im } = kernel, up = (values) => values.map((v) => -v);
+  solidKernel.show({ ...common, shape: flatSheet, motion: { f, re: up(re), im: up(im) }, unit: "Pa",
     period: solid.loop });
 }
 
@@ -461,8 +468,8 @@ function takeBody(record) {
 async function openScene(file) {
   try {
     const { values: own, body } = await sendFile(data.api, "scene", file);
-    takeBody(body);
-    set({ ...values, ...own, body: body.name });
+    if (body) takeBody(body);
+    set({ ...values, ...own, body: body?.name ?? values.body });
     notify(`${file.name} is open.`);
   } catch (error) { fail("scene", error.message); }
 }
@@ -605,11 +612,14 @@ function setToBest() {
 function listenToMaps() {
   for (const id of ["kernel-map", "wave-map"]) {
     let settling = 0;
-    mapControls($(id), (x, y) => {
-      const at = (v) => Math.min(Math.max(Math.round(1e4 * v) / 10, -50), 50);
-      set({ ...values, x: at(x), y: at(y) }, false);
+    const move = (next) => {
+      set(next, false);
       clearTimeout(settling);
       settling = setTimeout(() => set(values), PAUSE);
+    };
+    const at = (v) => Math.min(Math.max(Math.round(1e4 * v) / 10, -50), 50);
+    mapControls($(id), (x, y) => move({ ...values, x: at(x), y: at(y) }), (k, x, y) => {
+      try { move(withCorner(values, k, [x, y])); } catch { /* the path would leave its area */ }
     });
   }
 }

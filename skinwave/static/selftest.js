@@ -25,7 +25,7 @@ export async function runSelftest(data, bodyOf, loadOf) {
   for (const { body, values, lines, error: allowed } of data.selftest ?? []) {
     // Tests run at once while the page loads, so that a screenshot of it has the result.
     if (document.readyState === "complete") await new Promise((resolve) => setTimeout(resolve));
-    const own = { ...STARTS, ...values, body }, motion = bodyOf(body).respond(loadOf(own));
+    const own = { ...STARTS, ...values, body }, motion = bodyOf(body).motion(loadOf(own));
     const { error, f } = compare(motion, motion.at(own.x / 1e3, own.y / 1e3), lines);
     largest = Math.max(largest, error);
     if (!(error <= allowed)) failed++;

@@ -112,6 +112,23 @@ function extentOf(shape, size) {
 const pathsOf = (text) => rowsOf("paths", text).map(([shape, size, x, y]) => (
   { shape, size: shape === "point" ? 0 : size / 1e3, centre: [x / 1e3, y / 1e3] }));
 
+/** Key of the text with the places of a path that can be dragged; "" if there is none. */
+const draggedKey = ({ paths, shape }) => (paths ? "paths" : shape === "polyline" ? "polyline" : "");
+
+/** Places [[x, y]] in metre that can be dragged: corners of a polyline, or middles of own paths. */
+export function cornersOf(values) {
+  const key = draggedKey(values);
+  return key ? rowsOf(key, values[key]).map((row) => row.slice(-2).map((mm) => mm / 1e3)) : [];
+}
+
+/** Values with corner k at [x, y] in metre. The two ends of a closed polyline move together. */
+export function withCorner(values, k, at) {
+  const key = draggedKey(values), rows = parts(values[key]), before = rows[k];
+  const moved = [...before.split("/").slice(0, -2), ...at.map((v) => Math.round(1e4 * v) / 10)].join("/");
+  const isMoved = (row, j) => j === k || (key === "polyline" && row === before);
+  return { ...values, [key]: check(key, rows.map((row, j) => (isMoved(row, j) ? moved : row)).join(", ")) };
+}
+
 /**
  * Value of a control from typed text or a choice. Throws an Error with a sentence for users if it is unknown,
  * not a number or out of range.

@@ -22,25 +22,25 @@ pytestmark = needs_browser
 
 OPEN = "(record) => { (window.bodies ??= {})[record.name] = openBody(record); }"
 ANSWER = """({ name, values }) => {
-  const motion = bodies[name].respond(loadOf(values)), x = values.x / 1e3, y = values.y / 1e3;
+  const motion = bodies[name].motion(loadOf(values)), x = values.x / 1e3, y = values.y / 1e3;
   const count = Math.round(1e4 * values.duration), { re, im } = motion.at(x, y);
   const times = Float64Array.from({ length: count }, (_, k) => k * 1e-4);
   return { f: [...motion.f], re: [...re], im: [...im], u: [...motion.waveform(x, y, times)] };
 }"""
 PLACES = """({ name, values, k }) => {
-  const motion = bodies[name].respond(loadOf(values)), n = MAP_LINE.length;
+  const motion = bodies[name].motion(loadOf(values)), n = MAP_LINE.length;
   const map = motion.onGrid(MAP_LINE, MAP_LINE);
   const at = motion.at(MAP_LINE[k % n], MAP_LINE[Math.floor(k / n)]);
   return ["re", "im"].flatMap((own) => [...motion.f].map((_, l) => (
     [map[own][l * n * n + k], at[own][l]])));
 }"""
 LEVEL = """({ name, values }) => {
-  const motion = bodies[name].respond(loadOf(values));
+  const motion = bodies[name].motion(loadOf(values));
   return levelOf(motion.f, motion.at(values.x / 1e3, values.y / 1e3)).dB;
 }"""
 STRETCHING = """(values) => {
   const body = bodies["paper-sheet"];
-  return body.stretchingOf(body.respond(loadOf(values)));
+  return body.stretchingOf(body.motion(loadOf(values)));
 }"""
 H = 0.012  # m: size of the palm's elements in this test
 

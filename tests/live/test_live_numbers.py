@@ -317,9 +317,9 @@ def test_a_body_without_a_pack_is_named_on_the_page(monkeypatch):
         return pack_of(body, progress)
 
     monkeypatch.setattr(html_file, "pack_of", packed)
-    found = html_file.data_of(bodies=["paper-sheet", "skin-slab"], test=False)
+    found = html_file.data_of(bodies=["paper-sheet", "skin-slab"], tests=0)
     assert [record["name"] for record in found["bodies"]] == ["skin-slab"]
     assert found["start"] == {"body": "skin-slab"}
     assert "1 part of this result failed" in html_file.page(found)
     with pytest.raises(ValueError, match="no modes"):
-        html_file.data_of(bodies=["paper-sheet"], test=False)
+        html_file.data_of(bodies=["paper-sheet"], tests=0)
