@@ -185,8 +185,10 @@ def thin_plate_part(scene: Scene) -> ErrorPart:
 
 
 def thick_mesh_part(scene: Scene) -> Iterator[ErrorPart]:
-    """Yield the part due to shear and rotary inertia of a mesh that is thicker than its sheet."""
-    if not takes(FROM_REST, scene):
+    """Yield the part due to the shear and rotary inertia that a mesh has because it is thicker
+    than its sheet.
+    """
+    if equivalent(scene.body) <= scene.body.depth or not takes(FROM_REST, scene):
         return
     error = CLAMPED * effect_of(_thick_mesh, scene, len(sample_times(scene)))
     source = f"the mesh, {1e3 * equivalent(scene.body):.2g} mm thick for the same bending"
@@ -232,7 +234,7 @@ def _shear_and_inertia(body: Body, modes: PlateModes) -> Factors:
 
 
 def _thick_mesh(body: Body, modes: PlateModes) -> Factors:
-    return _of_thickness(body, modes, max(body.depth, equivalent(body)))
+    return _of_thickness(body, modes, equivalent(body))
 
 
 def _of_thickness(body: Body, modes: PlateModes, thickness: float) -> Factors:
