@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ Rows = list[list[str]]
 
 
 @dataclass
-class _Part:
+class Part:
     """Nodes and elements by number, element sets, and the sets that *ELEMENT and sections name."""
 
     name: str
@@ -45,9 +46,9 @@ class _Part:
 
 def read_abaqus(path: Path) -> Any:
     """Return all instances of the parts in a file, or its loose elements, as a meshio.Mesh."""
-    loose = current = _Part("")
-    parts: dict[str, _Part] = {}
-    instances: list[tuple[_Part, Rows]] = []
+    loose = current = Part("")
+    parts: dict[str, Part] = {}
+    instances: list[tuple[Part, Rows]] = []
     for keyword, options, rows in _blocks(path):
         if keyword in GENERATING or (keyword == "NODE" and options.get("SYSTEM", "R") != "R"):
             raise MeshError(
@@ -55,7 +56,7 @@ def read_abaqus(path: Path) -> Any:
                 "Abaqus/CAE or as .vtu with all of them written out"
             )
         if keyword == "PART":
-            current = parts[options.get("NAME", "").upper()] = _Part(options.get("NAME", ""))
+            current = parts[options.get("NAME", "").upper()] = Part(options.get("NAME", ""))
         elif keyword == "INSTANCE":
             name = options.get("PART", "")
             if name.upper() not in parts:
@@ -70,17 +71,13 @@ def read_abaqus(path: Path) -> Any:
             except (ValueError, IndexError):
                 raise MeshError(f"{path}: wrong numbers below *{keyword}; {AGAIN}") from None
     placed = [(loose, []), *instances] if instances else [(p, []) for p in (loose, *parts.values())]
-    return _join_parts(path, [(part, rows) for part, rows in placed if part.elements])
+    return join_parts(path, [(part, rows) for part, rows in placed if part.elements])
 
 
 def _lines(path: Path, level: int = 0) -> Iterator[str]:
     """Lines that are neither empty nor comments, with included files in their places."""
-    try:
-        content = read_exported_text(path, LARGEST).splitlines()
-    except ValueError as error:
-        raise MeshError(str(error)) from None
     head = ""
-    for raw in content:
+    for raw in text_lines(path):
         line = raw.strip()
         if line.startswith("**") or not line:
             continue
@@ -95,12 +92,23 @@ def _lines(path: Path, level: int = 0) -> Iterator[str]:
             yield head
         head = ""
         if keyword in ("INCLUDE", "NODE", "ELEMENT", "ELSET") and "INPUT" in options:
-            other = path.parent / options["INPUT"]
-            if level == MOST_INCLUDED or not other.is_file():
-                raise MeshError(
-                    f"{path} includes '{options['INPUT']}', which is missing; copy it there"
-                )
-            yield from _lines(other, level + 1)
+            yield from _lines(include(path, options["INPUT"], level), level + 1)
+
+
+def text_lines(path: Path) -> list[str]:
+    """Return the lines of a text file, or raise a MeshError."""
+    try:
+        return read_exported_text(path, LARGEST).splitlines()
+    except ValueError as error:
+        raise MeshError(str(error)) from None
+
+
+def include(path: Path, name: str, level: int = 0) -> Path:
+    """Return the path of a file that another one includes at a level of nesting."""
+    other = path.parent / name
+    if level == MOST_INCLUDED or not other.is_file():
+        raise MeshError(f"{path} includes '{name}', which is missing; copy it there")
+    return other
 
 
 def _keyword(line: str) -> tuple[str, dict[str, str]]:
@@ -124,7 +132,7 @@ def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], Rows]]:
     yield keyword, options, rows
 
 
-def _add(part: _Part, keyword: str, options: dict[str, str], rows: Rows) -> None:
+def _add(part: Part, keyword: str, options: dict[str, str], rows: Rows) -> None:
     if keyword == "NODE":
         for row in rows:
             place = [float(word or 0) for word in row[1:4]]
@@ -154,7 +162,7 @@ def _add(part: _Part, keyword: str, options: dict[str, str], rows: Rows) -> None
         part.sections.append(options.get("ELSET", "").upper())
 
 
-def _join_parts(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
+def join_parts(path: Path, placed: list[tuple[Part, Rows]]) -> Any:
     """All parts, in their places, as one mesh."""
     import meshio
 
@@ -183,14 +191,14 @@ def _join_parts(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
                 ) from None
             regions.setdefault(name, []).append(region.get(element, 0))
     notes = list(dict.fromkeys(notes))  # instances of one part have the same notes
-    notes += [f"left out {count:,} elements of type {kind}" for kind, count in left_out.items()]
+    notes += [f"left out {number:,} elements of type {kind}" for kind, number in left_out.items()]
     if len(placed) > 1:
         notes.append(f"read {len(placed)} parts or instances of parts")
     return meshio.Mesh(
         np.vstack(points),
         [(name, np.array(nodes)) for name, nodes in cells.items()],
         cell_data={"region": [np.array(regions[name]) for name in cells]},
-        info={"names": {number: name for name, number in names.items() if name}, "notes": notes},
+        info={"names": {n: name for name, n in names.items() if name != str(n)}, "notes": notes},
     )
 
 
@@ -207,7 +215,7 @@ def _solid_nodes(kind: str) -> int:
     return int(match[1]) if match else 0
 
 
-def _regions(part: _Part, names: dict[str, int], notes: list[str]) -> dict[int, int]:
+def _regions(part: Part, names: dict[str, int], notes: list[str]) -> dict[int, int]:
     """Region number, from 1, of each element; `names` collects those of all parts.
 
     Regions are the sets of sections; otherwise *ELSET sets or *ELEMENT sets that contain each
@@ -221,14 +229,13 @@ def _regions(part: _Part, names: dict[str, int], notes: list[str]) -> dict[int, 
     if unused := [title for title in sets if title not in chosen]:
         notes.append(f"element sets that are not regions: {', '.join(unused)}")
     regions = {title: sets[title] for title in chosen} or {part.name: set(part.elements)}
-    return {
-        element: names.setdefault(title, len(names) + 1)
-        for title, members in regions.items()
-        for element in members
-    }
+    for title in (title for title in regions if title not in names):
+        number = int(title) if title.isdigit() else 1
+        names[title] = next(n for n in count(number) if n not in names.values())
+    return {element: names[title] for title, members in regions.items() for element in members}
 
 
-def _is_partition(part: _Part, sets: dict[str, set[int]], titles: list[str]) -> bool:
+def _is_partition(part: Part, sets: dict[str, set[int]], titles: list[str]) -> bool:
     """Whether sets contain each element of a part once."""
     members = [element for title in titles for element in sets[title]]
     return len(members) == len(part.elements) and set(members) == set(part.elements)

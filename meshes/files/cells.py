@@ -16,7 +16,9 @@ from meshes.typing import Floats, Ints
 
 FACETS, REGION, NAMED = "facets:", "region ", "region:"
 # Cell arrays with region numbers, of this package, of others, and of meshio's readers.
-NUMBERED = ("region", "material", "medit:ref", "tetgen:ref", "nastran:ref", "cell_tags")
+NUMBERED = ("region", "material", "medit:ref", "cell_tags")
+PHYSICAL = "gmsh:physical"
+NO_REGIONS = re.compile(rf"{FACETS}|{NAMED}|.*(ghost|rank|partition|process)", re.IGNORECASE)
 OFF_MIDDLE = 0.25  # of the length of an edge: how far its mid-side node may lie from the middle
 
 # Corners of the faces of the solid elements that are split into tetrahedra.
@@ -72,7 +74,13 @@ def contents(path: Path, raw: Any) -> Contents:
             f"{path} has unsupported cells ({listed}); save only 4- or 10-node tetrahedra"
         )
     if not solid and not any(kind in PLANE for kind in counts):
-        raise MeshError(f"{path} has no triangles and no solid elements; give a file with a body")
+        what = "no triangles and no solid elements; give a file with a body"
+        if len(raw.points) and set(counts) <= {"vertex"}:
+            what = (
+                f"{len(raw.points):,} points without triangles; make a closed surface of them, for "
+                "example by screened Poisson reconstruction in MeshLab"
+            )
+        raise MeshError(f"{path} has {what}")
     notes = [
         f"left out {counts[kind]:,} cells of type {kind}" for kind in SMALLER if kind in counts
     ]
@@ -97,9 +105,10 @@ def _tetrahedra(
     if count := len(used) - len(np.unique(merged[used])):
         notes.append(f"merged {count:,} nodes that coincide with others, as where bodies touch")
     names = {abs(number): name for number, name in raw.info["names"].items()}
+    tag = _tag(raw, solid, notes)
     parts: list[tuple[Ints, Ints]] = []
     for kind in solid:
-        nodes, (own, titles) = merged[_join(raw.cells, kind)], _regions(raw, kind)
+        nodes, (own, titles) = merged[_join(raw.cells, kind)], _regions(raw, kind, tag)
         names |= titles
         if kind == "tetra10":
             nodes = nodes[:, _node_order(path, points, nodes)]
@@ -128,7 +137,7 @@ def _tetrahedra(
     tets = numbers.reshape(tets.shape)
     if inverted := int((corner_volumes(points[used], tets) < 0).sum()):
         notes.append(f"reordered {inverted:,} inverted tetrahedra of {len(tets):,}")
-    sets = _facet_sets(raw, new[merged], tets, notes)
+    sets = _facet_sets(raw, new[merged], tets, tag, notes)
     names = {number: name for number, name in names.items() if number in region}
     return Contents(
         points=points[used], tets=tets, region=region, names=names, facets=sets, notes=notes
@@ -194,25 +203,53 @@ def _values(raw: Any, name: str, kind: str) -> np.ndarray:
     )
 
 
-def _regions(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
-    """Region (e,) of each element from arrays, physical groups or element sets, and its names."""
-    for name in NUMBERED:
-        if name in raw.cell_data:
-            region = _values(raw, name, kind)
-            region = -region if name == "cell_tags" else region  # MED's are negative
-            names = {}
-            for title in raw.cell_data:
-                if title.startswith(NAMED) and (own := _values(raw, title, kind) == 1).any():
-                    names[int(region[own][0])] = title.removeprefix(NAMED)
-            return region, names
-    if "gmsh:physical" in raw.cell_data:
+def _tag(raw: Any, kinds: list[str], notes: list[str]) -> str:
+    """Name of the cell array with the regions of solid cells, or "": one of the usual names, or the
+    first with a few whole numbers.
+    """
+    numbers = {name: _solid_values(raw, name, kinds) for name in raw.cell_data}
+    if PHYSICAL in numbers and not numbers[PHYSICAL].any():
+        del numbers[PHYSICAL]
+    if known := next((name for name in (*NUMBERED, PHYSICAL) if name in numbers), ""):
+        return known
+    several = [
+        name for name, values in numbers.items()
+        if not NO_REGIONS.match(name) and (np.abs(values) < 2**31).all()
+        and (values == np.floor(values)).all() and 2 <= len(np.unique(values)) <= len(values) / 2
+    ]  # fmt: skip
+    found = next((name for name in several if (numbers[name] >= 0).all()), "")
+    if found:
+        notes.append(f"regions are the numbers in the cell array {found}")
+    if others := [name for name in several if name != found]:
+        notes.append(f"left out the cell arrays {', '.join(others)}")
+    return found
+
+
+def _solid_values(raw: Any, name: str, kinds: list[str]) -> Floats:
+    """Cell array (e,) by name over all solid cells; empty for one with components."""
+    blocks = zip(raw.cells, raw.cell_data[name], strict=True)
+    values = np.concatenate([np.asarray(x, float) for cells, x in blocks if cells.type in kinds])
+    return values if values.ndim == 1 else values[:0, 0]
+
+
+def _regions(raw: Any, kind: str, tag: str) -> tuple[Ints, dict[int, str]]:
+    """Region (e,) of each element from an array, physical groups or element sets, and its names."""
+    if tag == PHYSICAL:
         return _physical_groups(raw, kind)
-    return _element_sets(raw, kind)
+    if not tag:
+        return _element_sets(raw, kind)
+    region = _values(raw, tag, kind)
+    region = -region if tag == "cell_tags" else region  # MED's are negative
+    names = {}
+    for title in raw.cell_data:
+        if title.startswith(NAMED) and (own := _values(raw, title, kind) == 1).any():
+            names[int(region[own][0])] = title.removeprefix(NAMED)
+    return region, names
 
 
 def _physical_groups(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     """Physical group (e,) of each element, or the region number in its title, and group names."""
-    tags, place = np.unique(_values(raw, "gmsh:physical", kind), return_inverse=True)
+    tags, place = np.unique(_values(raw, PHYSICAL, kind), return_inverse=True)
     numbers, names = {}, {}
     for title, (tag, dimension) in raw.field_data.items():
         if dimension == 3:
@@ -237,8 +274,8 @@ def _element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     return np.concatenate(regions), names
 
 
-def _facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, Ints]:
-    """Facets (k, 3) or (k, 6) by name, from arrays `facets:<name>` or physical groups.
+def _facet_sets(raw: Any, new: Ints, tets: Ints, tag: str, notes: list[str]) -> dict[str, Ints]:
+    """Facets (k, 3) or (k, 6) by name, from arrays `facets:<name>`, physical groups or numbers.
 
     `new` (n,) maps nodes to those of the tetrahedra (m, 4 or 10), or to -1.
     """
@@ -251,9 +288,9 @@ def _facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, 
         facets, is_face, cell = _faces_of(new[_join(raw.cells, kind)], PLANE[kind], tets, width)
         lost += int((~is_face).sum())
         marked = {title: _values(raw, name, kind) == 1 for title, name in titles.items()}
-        if "gmsh:physical" in raw.cell_data:
-            tags = _values(raw, "gmsh:physical", kind)
-            other = set(tags.tolist()) - {0, *groups.values()}
+        if tag:
+            tags = _values(raw, tag, kind)
+            other = set(tags[tags > 0].tolist()) - set(groups.values())
             every = groups | {f"group {tag}": tag for tag in other}
             marked |= {title: tags == tag for title, tag in every.items()}
         for title, own in marked.items():

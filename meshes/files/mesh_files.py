@@ -19,14 +19,14 @@ import numpy as np
 
 from meshes import subprocess_call
 from meshes.files.cells import FACETS, NAMED, REGION, Contents
-from meshes.files.readers import BY_MESHIO, read_file
+from meshes.files.readers import BY_MESHIO, OTHERWISE, OWN, read_file
 from meshes.tetmesh import MeshError, TetMesh
 
 BY_VTK = (
     ".vtu", ".pvtu", ".vtk", ".vtm", ".vtkhdf", ".xdmf", ".xmf", ".exo", ".e", ".vtp", ".stl",
     ".ply", ".obj", ".glb", ".gltf",
 )  # fmt: skip
-FORMATS = (*BY_VTK, *BY_MESHIO, ".inp")
+FORMATS = (*BY_VTK, *BY_MESHIO, *OWN)
 SEVERAL_FILES = (".pvtu", ".vtm", ".xdmf", ".xmf", ".gltf")  # which name other files
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # gmsh cannot read the version 4.1 of meshio
@@ -48,7 +48,10 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
     try:
         return read(path, written.st_mtime_ns, written.st_size)
     except subprocess_call.Crashed:
-        raise MeshError(f"{path} is damaged or cut short; save it again") from None
+        raise MeshError(
+            f"{path} ended its reader: it is cut short, or of a variant that is not read; "
+            f"{OTHERWISE}"
+        ) from None
     except MeshError as error:
         raise MeshError(str(error).replace(str(path.resolve()), str(path))) from None
 

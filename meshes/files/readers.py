@@ -12,19 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from meshes.files.abaqus import AGAIN, read_abaqus
+from meshes.files.abaqus import AGAIN, include, read_abaqus, text_lines
 from meshes.files.cells import Contents, contents
+from meshes.files.nastran import read_nastran
+from meshes.files.xdmf import read_xdmf
 from meshes.tetmesh import MeshError
+from meshes.typing import Floats
 
-BY_MESHIO = {
-    ".msh": "gmsh", ".mesh": "medit", ".bdf": "nastran", ".nas": "nastran", ".fem": "nastran",
-    ".med": "med", ".ele": "tetgen", ".node": "tetgen", ".off": "off",
-}  # fmt: skip
+BY_MESHIO = {".msh": "gmsh", ".mesh": "medit", ".med": "med", ".off": "off"}
+OTHERWISE = "save it as .vtu (ParaView, meshio convert) or .msh (gmsh)"
 VTK_CELLS = {
     1: "vertex", 3: "line", 5: "triangle", 9: "quad", 10: "tetra", 11: "hexahedron",
     12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8",
     24: "tetra10", 25: "hexahedron20", 26: "wedge15", 27: "pyramid13",
 }  # fmt: skip
+LAGRANGE = {69: {3: 5, 6: 22}, 71: {4: 10, 10: 24}}  # triangles and tetrahedra by nodes
 SOLID = 3  # dimension
 VOXEL, BRICK = 11, [0, 1, 3, 2, 4, 5, 7, 6]  # corners of a voxel in the order of a hexahedron
 
@@ -49,45 +51,95 @@ def read_file(path: Path) -> Contents:
             '"skinwave[measure]", or save it as .vtu'
         ) from None
     except (Exception, SystemExit) as error:
-        why = "is damaged or has unsupported contents"
+        if "parametric" in str(error):
+            raise MeshError(
+                f"{path} has parametric nodes; save it without (Mesh.SaveParametric = 0 in gmsh)"
+            ) from None
+        why = "is cut short, or of a variant that is not read"
         if isinstance(error, MemoryError):
             why = "needs more memory than a mesh of its size should"
-        cure = "save it as version 2.2 (gmsh -format msh22)" if path.suffix == ".msh" else AGAIN
+        cure = "save it as version 2.2 (gmsh -format msh22)" if path.suffix == ".msh" else OTHERWISE
         raise MeshError(f"{path} cannot be read: it {why}; {cure}") from None
 
 
 def _read(path: Path) -> Any:
     """Read a file as a meshio.Mesh, whose `info` has `notes` and the `names` of regions."""
     suffix = path.suffix.lower()
-    if suffix == ".inp":
-        return read_abaqus(path)
-    if suffix in BY_MESHIO:
-        import meshio
+    if own := OWN.get(suffix):
+        return own(path)
+    if suffix not in BY_MESHIO:
+        return _read_vtk(path)
+    import meshio
 
-        _check_unread(path, BY_MESHIO[suffix])
-        with contextlib.redirect_stderr(io.StringIO()):
-            raw = meshio.read(path, file_format=BY_MESHIO[suffix])
-        families = getattr(raw, "cell_tags", {})  # of MED
-        raw.info = {
-            "notes": [],
-            "names": {int(n): ", ".join(names) for n, names in families.items()},
-        }
-        return raw
-    return _read_vtk(path)
+    if suffix == ".msh":
+        _check_gmsh(path)
+    with contextlib.redirect_stderr(io.StringIO()):
+        raw = getattr(meshio, BY_MESHIO[suffix]).read(str(path))
+    families = getattr(raw, "cell_tags", {})  # of MED
+    raw.info = {"notes": [], "names": {int(n): ", ".join(names) for n, names in families.items()}}
+    return raw
+
+
+def _check_gmsh(path: Path) -> None:
+    """Refuse what meshio ignores."""
+    content = path.read_bytes()
+    if b"$EndElements" not in content:
+        raise MeshError(
+            f"{path} is cut short or not a gmsh mesh, because it has no $EndElements; {AGAIN}"
+        )
+    if b"$PartitionedEntities" in content:
+        raise MeshError(f"{path} is partitioned; save it without partitions, or as version 2.2")
+    if b"$ParametricNodes" in content:
+        raise ValueError("parametric nodes")
+
+
+def _read_tetgen(path: Path) -> Any:
+    """Nodes and tetrahedra of 4 or 10 nodes; the last attribute of a tetrahedron is its region."""
+    import meshio
+
+    nodes, cells = _numbers(path, ".node", 4), _numbers(path, ".ele", 3).astype(int)
+    most, attributes = (
+        (10 if cells.shape[1] > 10 else 4),
+        cells.shape[1] > 11 or cells.shape[1] == 6,
+    )
+    return meshio.Mesh(
+        nodes[:, 1:4],
+        [("tetra" if most == 4 else "tetra10", cells[:, 1 : 1 + most] - int(nodes[0, 0]))],
+        cell_data={"region": [cells[:, -1]]} if attributes else {},
+        info={"notes": [], "names": {}},
+    )
+
+
+def _numbers(path: Path, end: str, head: int) -> Floats:
+    """The rows of numbers in one of TetGen's files, below a line of `head` numbers."""
+    lines = text_lines(include(path, path.with_suffix(end).name))
+    words = [word for line in lines for word in line.partition("#")[0].split()]
+    return np.array(words[head:], np.float64).reshape(int(words[0]), -1)
 
 
 def _read_vtk(path: Path) -> Any:
-    """The cells of all data sets of a VTK file. If several have solid cells, each is a region."""
+    """The cells of all data sets of a VTK file. If several have solid cells, each is a region.
+
+    In XDMF files, grids may share the points of another one, and have the regions of its cells.
+    """
     import meshio
     import pyvista
 
-    parts = [(name, _grid(part)) for name, part in _leaves(_data(path), "") if part.n_cells]
+    is_xdmf = path.suffix.lower() in (".xdmf", ".xmf")
+    data, shared = read_xdmf(path) if is_xdmf else (pyvista.read(path), dict[str, bool]())
+    parts = [(name, _grid(path, part)) for name, part in _leaves(data, "") if part.n_points]
+    parts.sort(key=lambda each: each[0] in shared)
     solid = list(dict.fromkeys(name for name, grid in parts if _kinds(grid, SOLID)))
+    tagged = [grid.n_cells for name, grid in parts if name in shared and name in solid]
+    solid = [name for name in solid if name not in shared]
     points, first = [np.zeros((0, 3))], 0
     blocks: list[tuple[str, np.ndarray, dict[str, np.ndarray]]] = []
     notes = [f"read {len(parts)} parts"] * (len(parts) > 1)
     for part, grid in parts:
-        for kind in _kinds(grid):
+        if part not in shared:
+            first = sum(map(len, points))
+            points.append(np.asarray(grid.points, np.float64))
+        for kind in [] if part not in shared and grid.n_cells in tagged else _kinds(grid):
             own = grid.celltypes == kind
             if kind not in VTK_CELLS:
                 name = pyvista.CellType(kind).name.lower().replace("_", " ")
@@ -99,37 +151,22 @@ def _read_vtk(path: Path) -> Any:
                 notes.append(f"left out {own.sum():,} cells of type {name}")
                 continue
             arrays = {name: np.asarray(grid.cell_data[name])[own] for name in grid.cell_data}
-            if len(solid) > 1 and part in solid:
+            if shared.get(part) and arrays:
+                arrays = {"region": next(iter(arrays.values()))}
+            elif len(solid) > 1 and part in solid:
                 arrays.setdefault("region", np.full(own.sum(), solid.index(part) + 1))
             nodes = np.asarray(grid.cells_dict[kind]) + first
             blocks.append((VTK_CELLS[kind], nodes[:, BRICK] if kind == VOXEL else nodes, arrays))
-        points.append(np.asarray(grid.points, np.float64))
-        first += grid.n_points
-    tags = {name for _, _, arrays in blocks for name, array in arrays.items() if array.ndim == 1}
-    names = dict(enumerate(solid, start=1)) if len(solid) > 1 else {}
+    flat = (name for _, _, arrays in blocks for name in arrays if arrays[name].ndim == 1)
     return meshio.Mesh(
         np.vstack(points),
         [(kind, nodes) for kind, nodes, _ in blocks],
         cell_data={
             tag: [arrays.get(tag, np.zeros(len(nodes), int)) for _, nodes, arrays in blocks]
-            for tag in tags
+            for tag in dict.fromkeys(flat)
         },
-        info={"notes": notes, "names": names},
-    )
-
-
-def _data(path: Path) -> Any:
-    """The content of a file as VTK reads it."""
-    import pyvista
-
-    if path.suffix.lower() not in (".xdmf", ".xmf"):
-        return pyvista.read(path)
-    from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
-
-    reader = vtkXdmfReader()  # pyvista's reader requires time steps
-    reader.SetFileName(str(path))
-    reader.Update()
-    return pyvista.wrap(reader.GetOutputDataObject(0))
+        info={"notes": notes, "names": {n: name for n, name in enumerate(solid, 1) if solid[1:]}},
+    )  # fmt: skip
 
 
 def _leaves(data: Any, name: str) -> Iterator[tuple[str, Any]]:
@@ -147,12 +184,34 @@ def _leaves(data: Any, name: str) -> Iterator[tuple[str, Any]]:
         yield name, data
 
 
-def _grid(part: Any) -> Any:
-    """A data set as an unstructured grid, with polygons and strips as triangles."""
+def _grid(path: Path, part: Any) -> Any:
+    """A data set as an unstructured grid: polygons and strips as triangles, Lagrange cells as those
+    of their number of nodes, and of an image the voxels whose label is not 0.
+    """
     import pyvista
 
+    if isinstance(part, pyvista.ImageData):
+        return _labelled(path, part)
     flat = part.triangulate() if isinstance(part, pyvista.PolyData) else part
-    return flat.cast_to_unstructured_grid()
+    grid = flat.cast_to_unstructured_grid()
+    for kind, by_nodes in LAGRANGE.items():
+        own, nodes = grid.celltypes == kind, np.diff(grid.offset)
+        for count in np.unique(nodes[own]).tolist():
+            grid.celltypes[own & (nodes == count)] = by_nodes.get(count, kind)
+    return grid
+
+
+def _labelled(path: Path, image: Any) -> Any:
+    """The voxels of a label image whose label is not 0."""
+    cells = image if len(image.cell_data) else image.points_to_cells()
+    for name in cells.cell_data:
+        labels = cells.cell_data[name]
+        if labels.dtype.kind in "iu" and not labels.all():
+            return cells.threshold(1, scalars=name)
+    raise MeshError(
+        f"{path} is an image of {image.n_cells:,} voxels, not a body; segment it, and save a "
+        "surface, or whole numbers that are 0 outside the body"
+    )
 
 
 def _kinds(grid: Any, dimension: int | None = None) -> list[int]:
@@ -163,24 +222,7 @@ def _kinds(grid: Any, dimension: int | None = None) -> list[int]:
     return [k for k in kinds if dimension in (None, pyvista.CellType(k).dimension)]
 
 
-def _check_unread(path: Path, kind: str) -> None:
-    """Refuse what meshio ignores: coordinate systems of Nastran, partitions of gmsh."""
-    content = path.read_bytes()
-    if kind == "gmsh" and b"$EndElements" not in content:
-        raise MeshError(
-            f"{path} is cut short or not a gmsh mesh, because it has no $EndElements; {AGAIN}"
-        )
-    if kind == "gmsh" and b"$PartitionedEntities" in content:
-        raise MeshError(f"{path} is partitioned; save it without partitions, or as version 2.2")
-    if kind != "nastran":
-        return
-    for line in content.decode(errors="replace").splitlines():
-        name, width = line[:8].partition(",")[0].strip().upper(), 16 if "*" in line[:8] else 8
-        if name.rstrip("*") == "GRID":
-            words = line.split(",")
-            system = words[2] if len(words) > 2 else line[8 + width : 8 + 2 * width]
-            if system.strip() not in ("", "0"):
-                raise MeshError(
-                    f"{path} gives nodes in coordinate system {system.strip()}; save it with all "
-                    "nodes in the basic system"
-                )
+OWN = {
+    ".inp": read_abaqus, ".bdf": read_nastran, ".nas": read_nastran, ".fem": read_nastran,
+    ".ele": _read_tetgen, ".node": _read_tetgen,
+}  # fmt: skip
