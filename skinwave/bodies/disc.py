@@ -8,6 +8,7 @@ from meshes import TetMesh
 from meshes.shapes.structured import disc
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretise, Discretised, in_layers
+from skinwave.bodies.slab import THIN_CELL
 
 
 def check(body: Body) -> None:
@@ -55,7 +56,9 @@ DISC = register(
         words=lambda body: f"disc of {1e3 * body.width:g} x {1e3 * body.depth:g} mm",
         discretise=discretise,
         morph=morph,
-        default_size=lambda body: min(body.width / 20, body.depth / 4),
+        # Thin discs have two layers of wider elements.
+        default_size=lambda body: min(body.width / 20, max(body.depth / 4, THIN_CELL)),
         is_symmetric=True,
+        conforming=True,
     )
 )  # fmt: skip

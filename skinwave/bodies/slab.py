@@ -23,6 +23,7 @@ from skinwave.bodies.supports import EDGES
 from skinwave.typing import Floats
 
 SLAB_CELL = 3e-3  # m: two thirds of the focal spot's standard deviation
+THIN_CELL = SLAB_CELL / 2  # of bodies that are thinner than two of them
 # Size ratio of neighbouring cells along the surface and downwards; coarsest cell over finest.
 GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
@@ -88,6 +89,8 @@ def _extend(body: Body, lines: Lines, wider: float = 1.0) -> Lines:
 
 def _depth_line(body: Body, h: float) -> Floats:
     """Grid lines of a slab from its top downwards."""
+    if body.depth < 2 * THIN_CELL:  # it may bend, which one layer shows less well
+        h = min(h, body.depth / 2)
     down = Grading(radius=0.0, growth=GROWTH[1], coarsest=COARSEST[1] * h)
     return with_planes(graded_axis(body.depth, h, down), [start for start, _ in body.strata[1:]])
 
@@ -129,7 +132,7 @@ SLAB = register(
         discretise=discretise,
         morph=morph,
         check_size=lambda body, h: check_size(len(line) - 1 for line in slab_grid_lines(body, h)),
-        default_size=lambda body: min(SLAB_CELL, body.depth / 2),
+        default_size=lambda body: min(SLAB_CELL, max(body.depth / 2, THIN_CELL)),
         compliance=lambda body: layered(stack(body)),
         dispersion=stack_dispersion,
         named_sides=tuple(EDGES),

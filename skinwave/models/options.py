@@ -30,6 +30,8 @@ class SolveOptions:
     tolerance : float, 0 to 1, acceptable relative error; at most a fiftieth is due to reduction
     h : float, m, element size; if not given, it and the extent of the body are planned
     dt : float, s, time step of "fem-transient" and the nonlinear models; chosen if not given
+    band : float, Hz up to which a reduced-order model meets its tolerance; a plan raises it for
+        stiff bodies under faster loads
     solver : str, a backend of `fem.linear_solver`, or "auto"
     times : (t,) float, s, equally spaced within the duration, the first a multiple of their step;
         10 kHz over the whole duration if not given. Lines above half their rate are left out
@@ -55,6 +57,7 @@ class SolveOptions:
     tolerance: float = 0.05
     h: float | None = None
     dt: float | None = None
+    band: float = 1000.0
     solver: str = "auto"
     times: ArrayLike | None = None
     progress: Progress = silent

@@ -50,9 +50,8 @@ from skinwave.models.free_keys import (
     with_values,
 )
 from skinwave.models.laws import relaxing
-from skinwave.models.options import solver_name, underflow_to_zero
+from skinwave.models.options import DEFAULT, solver_name, underflow_to_zero
 from skinwave.models.reduced import (
-    BAND,
     ReducedBody,
     cached_record,
     entry_name,
@@ -255,7 +254,7 @@ def _reduce(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict
     variants = [stage.variant(at, geometries) for at in stage.training()]
     with clock("factorise and reduce"), one_thread():
         model, error, factorisations = reduce_affine(
-            list(geometries.values()), variants, frequencies, band=BAND,
+            list(geometries.values()), variants, frequencies, band=DEFAULT.band,
             tolerance=SHARE * tolerance, solver=stage.solver, progress=partial(report, "reduce"),
         )  # fmt: skip
     surface = []

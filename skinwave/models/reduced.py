@@ -49,7 +49,6 @@ from skinwave.scene.scene import SURFACE, Body, Reading, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 from skinwave.typing import Bools, Floats
 
-BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
 REDUCTION_TOLERANCE = 4e-3  # at most
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
 FORMAT = "reduced 13"  # of a cached body
@@ -148,7 +147,7 @@ def prepare(
     path = path_key(along) if along else ""
     name = entry_name(
         body, build, probes, solver, tolerance, outputs=own, load=load,
-        path=f"{path} {reading.record.rate}" if along else "",
+        path=f"{path} {reading.record.rate}" if along else "", band=options.band,
     )  # fmt: skip
     with clock("read from cache"):
         reduced = cached_record(name)
@@ -156,7 +155,7 @@ def prepare(
         with one_thread():  # a second thread saves a tenth of the time, and rounds differently
             reduced = _prepare(
                 body, build, outputs, clock, report, solver, tolerance, load, along,
-                reading.record.rate if along else 0,
+                reading.record.rate if along else 0, options.band,
             )  # fmt: skip
         reduced = replace(reduced, probes=probes, path=path)
         store_record(name, reduced)
@@ -190,6 +189,7 @@ def entry_name(
     outputs: sparse.csr_array | None,
     load: Load = PRESSURE,
     path: str = "",
+    band: float = DEFAULT.band,
 ) -> str:
     """Return the cache key of everything that a reduced body depends on; `outputs` (p c, 3 n) are
     None for normal motion at the surface.
@@ -204,7 +204,7 @@ def entry_name(
     return cache.key(
         FORMAT, *Effort.__dataclass_fields__, body, mesh.points, mesh.tets, mesh.region, *facets,
         build.material, build.symmetry, build.fixed, build.absorbing, build.coat, build.drag,
-        build.held, build.tension, *support, probes, BAND, tolerance, solver_name(solver),
+        build.held, build.tension, *support, probes, band, tolerance, solver_name(solver),
         versions(), *read, replace(load, support_motion=None), direction, path,
     )  # fmt: skip
 
@@ -226,6 +226,7 @@ def path_loads(
 def _prepare(
     body: Body, build: Build, outputs: sparse.csr_array, clock: Clock, report: Progress,
     solver: str, tolerance: float, load: Load, along: MovingPressure | None, rate: int,
+    band: float,
 ) -> ReducedBody:  # fmt: skip
     operators = meshed.assemble(build, clock, report)
     with clock("factorise and reduce"):
@@ -239,7 +240,7 @@ def _prepare(
         reduced, _ = reduce_body(
             body, build, operators, outputs, tolerance, surface=(P, points), loads=loads,
             inertia=meshed.inertia(build, motion.unit) if motion else None, solver=solver,
-            report=report, from_loads=along is not None, rate=rate,
+            report=report, from_loads=along is not None, rate=rate, band=band,
         )  # fmt: skip
     moved = outputs @ meshed.translation(build, motion.unit if motion else (0.0, 0.0, 0.0))
     return replace(reduced, sag=still, translation=moved)
@@ -267,6 +268,7 @@ def reduce_body(
     report: Progress = silent,
     from_loads: bool = False,
     rate: int = 0,
+    band: float = DEFAULT.band,
 ) -> tuple[ReducedBody, fem.ReducedModel]:
     """Return the reduced body of a mesh and its operators, and its fem.ReducedModel with the basis.
 
@@ -284,7 +286,7 @@ def reduce_body(
     if from_loads and loads is not None:
         start, others = sparse.csr_array(loads.T), outputs.toarray().T
     model = fem.reduce(
-        operators, start, BAND, tolerance, loads=others, air=air(body, build, operators.free),
+        operators, start, band, tolerance, loads=others, air=air(body, build, operators.free),
         weighted=from_loads, rate=rate, point=meshed.expansion_point(body, build), solver=solver,
         progress=partial(report, "reduce"),
     )  # fmt: skip

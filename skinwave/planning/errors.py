@@ -13,7 +13,7 @@ from skinwave.models.laws import own_laws, series_tolerance
 from skinwave.models.limits import takes
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.plate_modes import STRETCHED, thick_mesh_part
-from skinwave.models.reduced import BAND, ReducedBody
+from skinwave.models.reduced import ReducedBody
 from skinwave.planning.estimates import spot_scale
 from skinwave.planning.left_out import series_error, stretching_error
 from skinwave.planning.plan_warnings import rigid_body_drift, under_resolved
@@ -55,10 +55,10 @@ def left_out_parts(
 
 def element_parts(
     scene: Scene, tolerance: float, h: float, *,
-    mesh: float, reduction: float, absorbing: float, above_band: float,
+    mesh: float, reduction: float, absorbing: float, above_band: float, band: float = DEFAULT.band,
 ) -> list[ErrorPart]:  # fmt: skip
     """Return the parts of linear elements of h in m, from the relative error of each cause; that of
-    the `mesh` is inf if it is unknown.
+    the `mesh` is inf if it is unknown, and `above_band` that of motion above a `band` in Hz.
     """
     elements = f"elements of {1e3 * h:.3g} mm"
     cure = "use smaller elements"
@@ -72,7 +72,7 @@ def element_parts(
         reduction_part(reduction),
         ErrorPart(name="absorbing layer", source="the absorbing layer", error=absorbing,
                   cure="use a larger body"),
-        band_part(scene, BAND, above_band),
+        band_part(scene, band, above_band),
         *thick_mesh_part(scene),
     ]  # fmt: skip
 

@@ -14,7 +14,7 @@ from simple_model.load.trajectory import BY_POINTS
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies.analytic import compliance, is_flat_layer, is_laterally_infinite, stack
 from skinwave.bodies.supports import EDGES
-from skinwave.scene.scene import Body, Scene
+from skinwave.scene.scene import SAMPLE_RATE, Body, Scene
 from skinwave.typing import Complex, Floats
 
 REFLECTION = 0.03  # reflection coefficient of an absorbing side and the layer around it
@@ -25,7 +25,7 @@ IN_PHASE, OVERDAMPED = 2.0, 1.5
 UNCLAMPED = 2.0  # factor for a base that is not clamped: small plates had up to 2.3
 NO_BOUND = 2.0  # difference of two waveforms over the larger one, which it never exceeds
 FAR = 0.25  # m, beyond which waves are neglected
-DURATION, RATE = 0.1, 2500.0  # s and Hz of the estimate of reflections
+DURATION = 0.1  # s of the estimate of reflections
 
 
 def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
@@ -97,7 +97,7 @@ def side_reflections(scene: Scene) -> float:
     if not is_estimated or _to_edge(scene, half) < 2 * spot_scale(scene.pressure):
         return NO_BOUND
     duration = min(scene.tacton.duration, DURATION)
-    times = np.arange(max(2, round(duration * RATE))) / RATE
+    times = np.arange(max(2, round(duration * SAMPLE_RATE))) / SAMPLE_RATE
     points = np.vstack([probes, *images])
     # Other quantities reflect about as the displacement of the surface does.
     quantity = scene.reading.record if scene.reading.record.is_normal else DISPLACEMENT

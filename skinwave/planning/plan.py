@@ -27,12 +27,12 @@ from skinwave.models.options import (
 )
 from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED, thin_plate_part
 from skinwave.models.point_kernel import SAME_LOAD
-from skinwave.models.reduced import answer
+from skinwave.models.reduced import answer, prepare
 from skinwave.planning import errors, estimates, left_out
 from skinwave.planning.extent import absorbing_error, extent, symmetry
 from skinwave.planning.plan_warnings import implausible
 from skinwave.planning.record import Plan, PlanRow
-from skinwave.planning.refinement import above_band, refine
+from skinwave.planning.refinement import above_band, element_sizes, first_size, refine
 from skinwave.planning.rows import cost_row, element_rows, neglected_rows
 from skinwave.scene.scene import Scene
 from skinwave.system.progress_bar import announce
@@ -42,6 +42,7 @@ THE_LOAD = ErrorPart(name="load", source="the pressure at the probes", error=0.0
 Grid = tuple[Floats, int]  # see `sample_grid`
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
 REQUESTED = "as requested"
+WIDEST = 4  # times its usual band, for a reduced model of a stiff body under fast loads
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -347,15 +348,17 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
         else:
             body, rows, absorbing = extent(scene, options, highest)
         for_mesh = replace(options, tolerance=rest_of(tolerance, absorbing))
-        mesh = refine(scene, body, for_mesh, symmetry=axes)
+        if highest > options.band:
+            for_mesh = _with_band(replace(scene, body=body), for_mesh, axes, times)
+        mesh, band = refine(scene, body, for_mesh, symmetry=axes), for_mesh.band
     except fem.NotReduced as error:
         limit = Limit(why=f"cannot reduce this body: {error}")
         raise refusal(scene, model, [limit]) from None
     scene, effort = replace(scene, body=body), mesh.prepared.effort
-    above = above_band(answer(mesh.prepared, scene, times=times).values, times[1])
+    above = above_band(answer(mesh.prepared, scene, times=times).values, times[1], band)
     parts = errors.element_parts(
         scene, tolerance, mesh.h, mesh=mesh.error, reduction=effort.estimate, absorbing=absorbing,
-        above_band=above,
+        above_band=above, band=band,
     )  # fmt: skip
     start = left_out.start_error(scene, model, request.grid, mesh.prepared)
     parts += errors.start_parts(model, start)
@@ -366,11 +369,23 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
         prepared=mesh.prepared,
         rows=(
             line_row, request.model_row(start), *rows,
-            *element_rows(scene, tolerance, axes, mesh, highest, options.h),
+            *element_rows(scene, tolerance, axes, mesh, highest, options.h, band),
         ),
         cautions=errors.element_warnings(scene, mesh.h),
     )  # fmt: skip
     return planned, parts
+
+
+def _with_band(scene: Scene, options: SolveOptions, axes: str, times: Floats) -> SolveOptions:
+    """Return options with the band that has the motion of a scene on a coarse mesh."""
+    h = options.h or first_size(scene, element_sizes(scene.body), options.tolerance)
+    for band in (options.band * n for n in range(1, WIDEST)):
+        tried = replace(options, h=h, band=band)
+        coarse = prepare(scene, tried, symmetry=axes, own_path=True)
+        moved = answer(coarse, scene, times=times).values
+        if above_band(moved, times[1], band) <= options.tolerance / 2:
+            return replace(options, band=band)
+    return replace(options, band=options.band * WIDEST)
 
 
 def rest_of(tolerance: float, error: float) -> float:

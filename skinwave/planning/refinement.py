@@ -20,7 +20,7 @@ from skinwave.bodies.slab import cell_layers
 from skinwave.bodies.tissue import FINE_PALM
 from skinwave.models import reduced
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.reduced import BAND, ReducedBody
+from skinwave.models.reduced import ReducedBody
 from skinwave.models.relative_change import NO_MOTION, relative_changes
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Progress, silent
@@ -226,7 +226,8 @@ def comparison_size(body: Body, h: float) -> float:
 
 def _has_cell_layers(body: Body) -> bool:
     """Whether the element size alone, not the body's layers, sets the number of cells in depth."""
-    return body.of_kind.is_layer and len(body.strata) == 1
+    is_thin = default_size(body) > body.depth / 2  # and has two layers in any case
+    return body.of_kind.is_layer and len(body.strata) == 1 and not is_thin
 
 
 def _layered_size(body: Body, layers: int, near: float) -> float:
@@ -265,8 +266,9 @@ def quantity_of_interest(prepared: ReducedBody, scene: Scene, response: Response
     return reduced.oscillating(reduced.components(prepared, *scene.loads)).lines
 
 
-def above_band(waveforms: Floats, step: float) -> float:
-    """Return the error of waveforms (t, p), sampled at a step in s, due to motion above `BAND`.
+def above_band(waveforms: Floats, step: float, band: float = DEFAULT.band) -> float:
+    """Return the error of waveforms (t, p), sampled at a step in s, due to motion above a band in
+    Hz.
 
     Velocity and acceleration have such a part where a load begins, or jumps, abruptly. In a reduced
     body this part is as large as the true one, but otherwise unrelated. The error is therefore the
@@ -275,7 +277,7 @@ def above_band(waveforms: Floats, step: float) -> float:
     """
     energy = fft.dct(waveforms, axis=0, norm="ortho") ** 2
     frequencies = np.arange(len(energy)) / (2 * step * len(energy))
-    above, whole = energy[frequencies > BAND].sum(axis=0), energy.sum(axis=0)
+    above, whole = energy[frequencies > band].sum(axis=0), energy.sum(axis=0)
     whole = np.maximum(whole, max(NO_MOTION**2 * whole.max(), 1e-300))
     return float(np.sqrt(2 * (above / whole).max()))
 

@@ -8,7 +8,7 @@ from skinwave.bodies.sheet import air_mass
 from skinwave.bodies.sizes import AT, coat, layer_name, thicknesses
 from skinwave.models import Cost
 from skinwave.models.meshed import axes_of_probes, mirrored_axes
-from skinwave.models.reduced import BAND, reduction_tolerance
+from skinwave.models.reduced import reduction_tolerance
 from skinwave.planning.left_out import mean_sag
 from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import Refined
@@ -19,9 +19,15 @@ LOWEST_AIR_FREQUENCY = 20.0  # Hz at which air is estimated if no line is higher
 
 
 def element_rows(
-    scene: Scene, tolerance: float, axes: str, mesh: Refined, highest: float, h: float | None
+    scene: Scene,
+    tolerance: float,
+    axes: str,
+    mesh: Refined,
+    highest: float,
+    h: float | None,
+    band: float,
 ) -> list[PlanRow]:
-    """Return the rows of elements for symmetry `axes`, a `highest` line in Hz and a given h."""
+    """Return the rows of elements: symmetry `axes`, size h, and a `band` and a line in Hz."""
     effort = mesh.prepared.effort
     return [
         _symmetry_row(scene, axes),
@@ -29,7 +35,7 @@ def element_rows(
         *coat_rows(scene.body, mesh.h),
         PlanRow(
             what="reduction",
-            value=f"{effort.reduced_dofs} dofs, error {effort.estimate:.0e} up to {BAND:.0f} Hz",
+            value=f"{effort.reduced_dofs} dofs, error {effort.estimate:.0e} up to {band:.0f} Hz",
             reason=f"reduced to an error of {reduction_tolerance(tolerance):.1g}, which costs "
             "little",
         ),

@@ -22,17 +22,25 @@ UNITS = {  # by the end of a key: kind of quantity, and unit in SI units
     }.items()
     for end, unit in units.items()
 }
+AT = "at the frequency f in Hz that matters"
 CONVERSIONS: tuple[tuple[str, str, str, Callable[[float], float]], ...] = (
-    # other names, key, its value in words and as a function of the other one
-    ("quality_factor q_factor q", "loss_factor", "1 / Q", lambda q: 1 / q),
-    ("damping_ratio zeta damping", "loss_factor", "2 zeta", lambda zeta: 2 * zeta),
-    ("log_decrement logarithmic_decrement", "loss_factor", "decrement / pi", lambda d: d / pi),
-    ("loss_angle_deg phase_angle_deg", "loss_factor", "tan(angle)", lambda x: tan(radians(x))),
-    ("loss_tangent tan_delta", "loss_factor", "tan(delta)", lambda loss: loss),
-    ("radius_mm radius", "size_mm", "2 radius", lambda radius: 2 * radius),
-    ("diameter_mm diameter", "size_mm", "diameter", lambda diameter: diameter),
-    ("bulk_modulus_pa bulk_modulus", "poisson", "(3 K - 2 G) / (6 K + 2 G)", lambda _: nan),
-)
+    # other names without underscores, key, its value in words and as a function of the other one
+    ("qualityfactor qfactor q qs", "loss_factor", "1 / Q", lambda q: 1 / q),
+    ("dampingratio modaldamping zeta damping xi", "loss_factor", "2 zeta", lambda zeta: 2 * zeta),
+    ("dampingpercent dampingratiopercent", "loss_factor", "2 zeta / 100", lambda x: x / 50),
+    ("logdecrement logarithmicdecrement", "loss_factor", "decrement / pi", lambda d: d / pi),
+    ("lossangledeg phaseangledeg", "loss_factor", "tan(angle)", lambda x: tan(radians(x))),
+    ("losstangent tandelta tand eta", "loss_factor", "tan(delta)", lambda loss: loss),
+    ("structuraldamping hystereticdamping", "loss_factor", "its value", lambda loss: loss),
+    ("lossmodulus lossmoduluspa", "loss_factor", "loss modulus / shear modulus", lambda _: nan),
+    ("alpha rayleighalpha massdamping", "loss_factor", f"alpha / (2 pi f) {AT}", lambda _: nan),
+    ("beta rayleighbeta stiffnessdamping", "loss_factor", f"2 pi f beta {AT}", lambda _: nan),
+    ("rayleigh rayleighdamping", "loss_factor", f"alpha / (2 pi f) + 2 pi f beta {AT}",
+     lambda _: nan),
+    ("radiusmm radius", "size_mm", "2 radius", lambda radius: 2 * radius),
+    ("diametermm diameter", "size_mm", "diameter", lambda diameter: diameter),
+    ("bulkmoduluspa bulkmodulus", "poisson", "(3 K - 2 G) / (6 K + 2 G)", lambda _: nan),
+)  # fmt: skip
 
 
 def key_hint(key: str, known: Iterable[str], value: Any = None) -> str:
@@ -41,7 +49,7 @@ def key_hint(key: str, known: Iterable[str], value: Any = None) -> str:
     """
     known = list(known)
     for names, other, words, of in CONVERSIONS:
-        if key.lower() in names.split() and other in known:
+        if key.lower().replace("_", "") in names.split() and other in known:
             return f"; write {other} = {words}{_result(of, value)}"
     near = nearest(key, known)
     factor = _units_between(key.lower(), near) * (0.5 if _is_diameter(key, near) else 1.0)

@@ -46,6 +46,11 @@ def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) 
 
 def _check_limits(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> None:
     """Refuse numbers that no solid has in these units; results would overflow."""
+    if values.get("shear_modulus") == 0:
+        raise ValueError(
+            f"{where} is a fluid, because its shear modulus is 0; fluids are not modelled, so give "
+            f"{keys['shear_modulus']} of a solid"
+        )
     slowest = LONGEST * values.get("shear_modulus", inf)
     for name, (low, high) in {**LIMITS, "viscosity": (-inf, slowest)}.items():
         if isfinite(value := values.get(name, low)) and not low <= value <= high:
@@ -62,7 +67,7 @@ def _by_shear(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) ->
     rest = {name: value for name, value in values.items() if name != "young"}
     if "poisson" not in values:
         raise ValueError(f"{where} has {keys['young']} without {keys['poisson']}; give both")
-    if not values["young"] > 0:
+    if not values["young"] >= 0:
         raise ValueError(f"{where} has {keys['young']} = {values['young']:g}; give a value above 0")
     shear = values["young"] / (2 * (1 + max(values["poisson"], LEAST_POISSON)))
     given = rest.get("shear_modulus", shear)
