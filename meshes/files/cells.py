@@ -16,8 +16,8 @@ from meshes.typing import Floats, Ints
 
 FACETS, REGION, NAMED = "facets:", "region ", "region:"
 # Cell arrays with region numbers, of this package, of others, and of meshio's readers.
-NUMBERED = ("region", "material", "medit:ref", "cell_tags")
 PHYSICAL = "gmsh:physical"
+NUMBERED = ("region", "material", "medit:ref", "cell_tags", PHYSICAL)
 NO_REGIONS = re.compile(rf"{FACETS}|{NAMED}|.*(ghost|rank|partition|process)", re.IGNORECASE)
 OFF_MIDDLE = 0.25  # of the length of an edge: how far its mid-side node may lie from the middle
 
@@ -31,7 +31,11 @@ SPLIT = {
 SOLID = ("tetra", "tetra10", *SPLIT)
 PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  # corners
 SMALLER = ("vertex", "line", "line3")
+MESHED = "make a closed surface of them, as by screened Poisson reconstruction in MeshLab"
 FLAT = 1e-9  # of the volume of its cell: smaller tetrahedra come from a collapsed cell
+
+
+Arrays = dict[str, dict[str, np.ndarray]]  # by name and kind of cell
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,45 +63,40 @@ class Contents:
 
 def contents(path: Path, raw: Any) -> Contents:
     """Return the contents of a mesh that meshio read; its `info` has `notes` and region `names`."""
-    counts: dict[str, int] = {}
-    for block in raw.cells:
-        if not len(block.data):
-            continue
-        counts[block.type] = counts.get(block.type, 0) + len(block.data)
-        if np.min(block.data) < 0 or np.max(block.data) >= len(raw.points):
+    cells = {kind: nodes.astype(np.int64) for kind, nodes in raw.cells_dict.items() if len(nodes)}
+    for nodes in cells.values():
+        if nodes.min() < 0 or nodes.max() >= len(raw.points):
             raise MeshError(f"{path} has cells that refer to missing points; save it again")
-    solid = [kind for kind in SOLID if kind in counts]
-    unknown = [kind for kind in counts if kind not in (*SOLID, *PLANE, *SMALLER)]
+    solid = [kind for kind in SOLID if kind in cells]
+    unknown = [kind for kind in cells if kind not in (*SOLID, *PLANE, *SMALLER)]
     if unknown or ("tetra10" in solid and len(solid) > 1):
-        listed = ", ".join(f"{counts[kind]:,} of type {kind}" for kind in unknown or solid)
+        listed = ", ".join(f"{len(cells[kind]):,} of type {kind}" for kind in unknown or solid)
         raise MeshError(
             f"{path} has unsupported cells ({listed}); save only 4- or 10-node tetrahedra"
         )
-    if not solid and not any(kind in PLANE for kind in counts):
+    if not solid and cells.keys().isdisjoint(PLANE):
         what = "no triangles and no solid elements; give a file with a body"
-        if len(raw.points) and set(counts) <= {"vertex"}:
-            what = (
-                f"{len(raw.points):,} points without triangles; make a closed surface of them, for "
-                "example by screened Poisson reconstruction in MeshLab"
-            )
+        if len(raw.points) and cells.keys() <= {"vertex"}:
+            what = f"{len(raw.points):,} points without triangles; {MESHED}"
         raise MeshError(f"{path} has {what}")
     notes = [
-        f"left out {counts[kind]:,} cells of type {kind}" for kind in SMALLER if kind in counts
+        f"left out {len(cells[kind]):,} cells of type {kind}" for kind in SMALLER if kind in cells
     ]
     notes = [*raw.info["notes"], *notes]
     points = np.zeros((len(raw.points), 3))
     points[:, : raw.points.shape[1]] = raw.points
     if solid:
-        return _tetrahedra(path, raw, points, solid, notes)
-    fans = [_fan(_join(raw.cells, kind), PLANE[kind])[0] for kind in PLANE if kind in counts]
+        return _tetrahedra(path, raw, cells, points, notes)
+    fans = [_fan(cells[kind], PLANE[kind])[0] for kind in PLANE if kind in cells]
     return Contents(points=points, triangles=np.vstack(fans), notes=notes)
 
 
 def _tetrahedra(
-    path: Path, raw: Any, points: Floats, solid: list[str], notes: list[str]
+    path: Path, raw: Any, cells: dict[str, Ints], points: Floats, notes: list[str]
 ) -> Contents:
     """Tetrahedra and used nodes, each once, with their regions and facet sets."""
-    used = np.unique(np.concatenate([_join(raw.cells, kind).ravel() for kind in solid]))
+    solid = [kind for kind in SOLID if kind in cells]
+    used = np.unique(np.concatenate([cells[kind].ravel() for kind in solid]))
     if bad := int((~np.isfinite(points[used])).any(axis=1).sum()):
         raise MeshError(f"{path} has {bad:,} nodes whose coordinates are not finite; correct them")
     merged = np.arange(len(points))
@@ -105,10 +104,10 @@ def _tetrahedra(
     if count := len(used) - len(np.unique(merged[used])):
         notes.append(f"merged {count:,} nodes that coincide with others, as where bodies touch")
     names = {abs(number): name for number, name in raw.info["names"].items()}
-    tag = _tag(raw, solid, notes)
+    tag = _tag(raw.cell_data_dict, solid, notes)
     parts: list[tuple[Ints, Ints]] = []
     for kind in solid:
-        nodes, (own, titles) = merged[_join(raw.cells, kind)], _regions(raw, kind, tag)
+        nodes, (own, titles) = merged[cells[kind]], _regions(raw, kind, tag)
         names |= titles
         if kind == "tetra10":
             nodes = nodes[:, _node_order(path, points, nodes)]
@@ -137,7 +136,7 @@ def _tetrahedra(
     tets = numbers.reshape(tets.shape)
     if inverted := int((corner_volumes(points[used], tets) < 0).sum()):
         notes.append(f"reordered {inverted:,} inverted tetrahedra of {len(tets):,}")
-    sets = _facet_sets(raw, new[merged], tets, tag, notes)
+    sets = _facet_sets(raw, {k: new[merged[nodes]] for k, nodes in cells.items()}, tets, tag, notes)
     names = {number: name for number, name in names.items() if number in region}
     return Contents(
         points=points[used], tets=tets, region=region, names=names, facets=sets, notes=notes
@@ -188,36 +187,19 @@ def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, In
     return parts[solid], cell[solid]
 
 
-def _join(cells: Any, kind: str) -> Ints:
-    """Nodes (e, a) of all blocks of a kind."""
-    return np.vstack(
-        [np.asarray(block.data).astype(np.int64) for block in cells if block.type == kind]
-    )
-
-
-def _values(raw: Any, name: str, kind: str) -> np.ndarray:
-    """Cell array (e,) by name over all blocks of a kind, in native byte order."""
-    blocks = zip(raw.cells, raw.cell_data[name], strict=True)
-    return np.concatenate([np.asarray(x) for cells, x in blocks if cells.type == kind]).astype(
-        np.int64
-    )
-
-
-def _tag(raw: Any, kinds: list[str], notes: list[str]) -> str:
+def _tag(arrays: Arrays, solid: list[str], notes: list[str]) -> str:
     """Name of the cell array with the regions of solid cells, or "": one of the usual names, or the
     first with a few whole numbers.
     """
-    numbers = {name: _solid_values(raw, name, kinds) for name in raw.cell_data}
-    if PHYSICAL in numbers and not numbers[PHYSICAL].any():
-        del numbers[PHYSICAL]
-    if known := next((name for name in (*NUMBERED, PHYSICAL) if name in numbers), ""):
-        return known
+    numbers = {name: np.concatenate([own[kind] for kind in solid]) for name, own in arrays.items()}
+    usual = [name for name in NUMBERED if name in arrays]
+    if usual and (usual[0] != PHYSICAL or numbers[PHYSICAL].any()):
+        return usual[0]
     several = [
-        name for name, values in numbers.items()
-        if not NO_REGIONS.match(name) and (np.abs(values) < 2**31).all()
-        and (values == np.floor(values)).all() and 2 <= len(np.unique(values)) <= len(values) / 2
+        name for name, x in numbers.items() if not NO_REGIONS.match(name) and x.ndim == 1
+        and (np.floor(x) == x).all() and 1 < len(np.unique(x)) <= len(x) / 2
     ]  # fmt: skip
-    found = next((name for name in several if (numbers[name] >= 0).all()), "")
+    found = next((name for name in several if numbers[name].min() >= 0), "")
     if found:
         notes.append(f"regions are the numbers in the cell array {found}")
     if others := [name for name in several if name != found]:
@@ -225,31 +207,25 @@ def _tag(raw: Any, kinds: list[str], notes: list[str]) -> str:
     return found
 
 
-def _solid_values(raw: Any, name: str, kinds: list[str]) -> Floats:
-    """Cell array (e,) by name over all solid cells; empty for one with components."""
-    blocks = zip(raw.cells, raw.cell_data[name], strict=True)
-    values = np.concatenate([np.asarray(x, float) for cells, x in blocks if cells.type in kinds])
-    return values if values.ndim == 1 else values[:0, 0]
-
-
 def _regions(raw: Any, kind: str, tag: str) -> tuple[Ints, dict[int, str]]:
-    """Region (e,) of each element from an array, physical groups or element sets, and its names."""
+    """Region (e,) of each element from an array or physical groups, and its names."""
+    arrays = raw.cell_data_dict
     if tag == PHYSICAL:
-        return _physical_groups(raw, kind)
+        return _physical_groups(raw, arrays[tag][kind])
     if not tag:
-        return _element_sets(raw, kind)
-    region = _values(raw, tag, kind)
+        return np.zeros(len(raw.cells_dict[kind]), np.int64), {}
+    region = arrays[tag][kind].astype(np.int64)
     region = -region if tag == "cell_tags" else region  # MED's are negative
     names = {}
-    for title in raw.cell_data:
-        if title.startswith(NAMED) and (own := _values(raw, title, kind) == 1).any():
-            names[int(region[own][0])] = title.removeprefix(NAMED)
+    for title, own in arrays.items():
+        if title.startswith(NAMED) and (own[kind] == 1).any():
+            names[int(region[own[kind] == 1][0])] = title.removeprefix(NAMED)
     return region, names
 
 
-def _physical_groups(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
+def _physical_groups(raw: Any, groups: Ints) -> tuple[Ints, dict[int, str]]:
     """Physical group (e,) of each element, or the region number in its title, and group names."""
-    tags, place = np.unique(_values(raw, PHYSICAL, kind), return_inverse=True)
+    tags, place = np.unique(groups, return_inverse=True)
     numbers, names = {}, {}
     for title, (tag, dimension) in raw.field_data.items():
         if dimension == 3:
@@ -260,45 +236,33 @@ def _physical_groups(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     return np.array([numbers.get(tag, tag) for tag in tags.tolist()], np.int64)[place], names
 
 
-def _element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
-    """Number (e,), from 1, of the last set that contains each element, or 0, and set names."""
-    blocks = [i for i, block in enumerate(raw.cells) if block.type == kind]
-    regions = [np.zeros(len(raw.cells[i].data), np.int64) for i in blocks]
-    names: dict[int, str] = {}
-    for name, members in raw.cell_sets.items():
-        own = [np.asarray(members[i], np.int64) for i in blocks]
-        if sum(map(len, own)) and not name.startswith("gmsh:"):
-            names[len(names) + 1] = str(name)
-            for region, elements in zip(regions, own, strict=True):
-                region[elements] = len(names)
-    return np.concatenate(regions), names
-
-
-def _facet_sets(raw: Any, new: Ints, tets: Ints, tag: str, notes: list[str]) -> dict[str, Ints]:
+def _facet_sets(
+    raw: Any, cells: dict[str, Ints], tets: Ints, tag: str, notes: list[str]
+) -> dict[str, Ints]:
     """Facets (k, 3) or (k, 6) by name, from arrays `facets:<name>`, physical groups or numbers.
 
-    `new` (n,) maps nodes to those of the tetrahedra (m, 4 or 10), or to -1.
+    `cells` have the node numbers of the tetrahedra (m, 4 or 10), or -1.
     """
-    titles = {name.removeprefix(FACETS): name for name in raw.cell_data if name.startswith(FACETS)}
-    groups = {title: tag for title, (tag, d) in raw.field_data.items() if d == 2}
-    width = 3 if tets.shape[1] == 4 else 6
-    sets: dict[str, list[Ints]] = {title: [] for title in (*titles, *groups)}
+    arrays = raw.cell_data_dict
+    titles = [name for name in arrays if name.startswith(FACETS)]
+    groups = {title: group for title, (group, d) in raw.field_data.items() if d == 2}
+    empty = np.zeros((0, 3 if tets.shape[1] == 4 else 6), np.int64)
+    sets = {title.removeprefix(FACETS): empty for title in (*titles, *groups)}
     lost = 0
-    for kind in [kind for kind in PLANE if any(block.type == kind for block in raw.cells)]:
-        facets, is_face, cell = _faces_of(new[_join(raw.cells, kind)], PLANE[kind], tets, width)
+    for kind in [kind for kind in PLANE if kind in cells]:
+        facets, is_face, cell = _faces_of(cells[kind], PLANE[kind], tets, empty.shape[1])
         lost += int((~is_face).sum())
-        marked = {title: _values(raw, name, kind) == 1 for title, name in titles.items()}
+        marked = {title.removeprefix(FACETS): arrays[title][kind] == 1 for title in titles}
         if tag:
-            tags = _values(raw, tag, kind)
+            tags = arrays[tag][kind].astype(np.int64)
             other = set(tags[tags > 0].tolist()) - set(groups.values())
-            every = groups | {f"group {tag}": tag for tag in other}
-            marked |= {title: tags == tag for title, tag in every.items()}
+            every = groups | {f"group {number}": number for number in other}
+            marked |= {title: tags == number for title, number in every.items()}
         for title, own in marked.items():
-            sets.setdefault(title, []).append(facets[own[cell] & is_face])
+            sets[title] = np.vstack([sets.get(title, empty), facets[own[cell] & is_face]])
     if lost:
         notes.append(f"left out {lost:,} triangles that are not faces of tetrahedra")
-    empty = np.zeros((0, width), np.int64)
-    return {title: np.vstack([empty, *parts]) for title, parts in sets.items()}
+    return sets
 
 
 def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, np.ndarray, Ints]:
