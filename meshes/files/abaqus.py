@@ -25,6 +25,9 @@ SOLIDS = {
 FACES = {3: "triangle", 4: "quad"}
 # Keywords that generate, copy or move nodes and elements.
 GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
+INCLUDED = (
+    r"(?im)^[ \t]*\*(?:INCLUDE|NODE|ELEMENT|ELSET)\b[^\n]*,\s*INPUT\s*=\s*\"?(?P<file>[^\",\n]+).*"
+)
 MOST_INCLUDED = 20  # levels of nested *INCLUDE
 LARGEST = 500_000_000  # bytes
 AGAIN = "save it again from the program that made it"
@@ -74,31 +77,17 @@ def read_abaqus(path: Path) -> Any:
     return join_parts(path, [(part, rows) for part, rows in placed if part.elements])
 
 
-def _lines(path: Path, level: int = 0) -> Iterator[str]:
-    """Lines that are neither empty nor comments, with included files in their places."""
-    head = ""
-    for raw in text_lines(path):
-        line = raw.strip()
-        if line.startswith("**") or not line:
-            continue
-        if not (line.startswith("*") or head):
-            yield line
-            continue
-        head += line  # a keyword line continues after a comma
-        if head.endswith(","):
-            continue
-        keyword, options = _keyword(head)
-        if keyword != "INCLUDE":
-            yield head
-        head = ""
-        if keyword in ("INCLUDE", "NODE", "ELEMENT", "ELSET") and "INPUT" in options:
-            yield from _lines(include(path, options["INPUT"], level), level + 1)
+def expanded(path: Path, pattern: str = "(?!)", level: int = 0) -> str:
+    """Return the text of a file with the files that a pattern includes, by its group `file`."""
 
+    def other(match: re.Match[str]) -> str:
+        before = "" if "INCLUDE" in match[0].upper() else match[0] + "\n"
+        return before + expanded(include(path, match["file"].strip(), level), pattern, level + 1)
 
-def text_lines(path: Path) -> list[str]:
-    """Return the lines of a text file, or raise a MeshError."""
     try:
-        return read_exported_text(path, LARGEST).splitlines()
+        return re.sub(pattern, other, read_exported_text(path, LARGEST))
+    except MeshError:
+        raise
     except ValueError as error:
         raise MeshError(str(error)) from None
 
@@ -111,25 +100,20 @@ def include(path: Path, name: str, level: int = 0) -> Path:
     return other
 
 
-def _keyword(line: str) -> tuple[str, dict[str, str]]:
-    """Keyword and options of a line."""
-    name, *words = [word.strip() for word in line[1:].split(",")]
-    pairs = [word.partition("=")[::2] for word in words]
-    options = {key.strip().upper(): value.strip().strip('"') for key, value in pairs}
-    return " ".join(name.upper().split()), options
-
-
 def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], Rows]]:
     """Each keyword with its options and the data lines below it."""
-    keyword, options = _keyword("*")
-    rows: Rows = []
-    for line in _lines(path):
-        if line.startswith("*"):
-            yield keyword, options, rows
-            (keyword, options), rows = _keyword(line), []
-        else:
-            rows.append([word.strip() for word in line.split(",")])  # the last is "" after a comma
-    yield keyword, options, rows
+    text = re.sub(r"(?m)^[ \t]*\*\*.*", "", expanded(path, INCLUDED))  # comments
+    for block in re.split(r"(?m)^[ \t]*\*", text):
+        head, *lines = [line.strip() for line in block.splitlines() if line.strip()] or [""]
+        while head.endswith(",") and lines:  # a keyword line continues after a comma
+            head += lines.pop(0)
+        name, *pairs = head.split(",")
+        options = dict(pair.partition("=")[::2] for pair in pairs)
+        yield (
+            " ".join(name.upper().split()),
+            {key.strip().upper(): value.strip(' \t"') for key, value in options.items()},
+            [[word.strip() for word in line.split(",")] for line in lines],  # "" after a comma
+        )
 
 
 def _add(part: Part, keyword: str, options: dict[str, str], rows: Rows) -> None:

@@ -96,11 +96,14 @@ def _tetrahedra(
 ) -> Contents:
     """Tetrahedra and used nodes, each once, with their regions and facet sets."""
     solid = [kind for kind in SOLID if kind in cells]
-    used = np.unique(np.concatenate([cells[kind].ravel() for kind in solid]))
+    used = np.unique(
+        np.concatenate([cells[kind].ravel() for kind in (*solid, *PLANE) if kind in cells])
+    )
     if bad := int((~np.isfinite(points[used])).any(axis=1).sum()):
         raise MeshError(f"{path} has {bad:,} nodes whose coordinates are not finite; correct them")
     merged = np.arange(len(points))
     merged[used] = used[first_coincident(points[used])]
+    used = np.unique(np.concatenate([cells[kind].ravel() for kind in solid]))
     if count := len(used) - len(np.unique(merged[used])):
         notes.append(f"merged {count:,} nodes that coincide with others, as where bodies touch")
     names = {abs(number): name for number, name in raw.info["names"].items()}

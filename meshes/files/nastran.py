@@ -10,12 +10,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from meshes.files.abaqus import AGAIN, Part, include, join_parts, text_lines
+from meshes.files.abaqus import AGAIN, Part, expanded, join_parts
 from meshes.tetmesh import MeshError
 
 SOLIDS = {"CTETRA": (4, 10), "CPYRAM": (5, 13), "CPENTA": (6, 15), "CHEXA": (8, 20)}  # nodes
 SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}  # corners
-INCLUDE = re.compile(r"INCLUDE\s+['\"]?([^'\"]+)", re.IGNORECASE)
+INCLUDED = r"(?im)^INCLUDE\s+['\"]?(?P<file>[^'\"\n]+).*"
 
 
 def read_nastran(path: Path) -> Any:
@@ -50,10 +50,10 @@ def _element(name: str, fields: list[str]) -> tuple[str, list[int]]:
 
 def _cards(path: Path) -> Iterator[tuple[str, list[str]]]:
     """Name of each card, and its fields with those of continuations."""
-    lines = list(_lines(path))
-    begin = max((i for i, line in enumerate(lines) if line.upper().startswith("BEGIN")), default=-1)
+    text = re.sub(r"[ ]*\$.*", "", expanded(path, INCLUDED))  # comments
+    text = re.split(r"(?im)^ENDDATA", re.split(r"(?im)^BEGIN[^\n]*", text)[-1])[0]
     name, fields = "$", list[str]()
-    for line in lines[begin + 1 :]:
+    for line in filter(str.strip, text.splitlines()):
         first, *words = _fields(line)
         if first[:1] in ("", "+", "*"):
             fields += words
@@ -65,24 +65,12 @@ def _cards(path: Path) -> Iterator[tuple[str, list[str]]]:
 
 def _fields(line: str) -> list[str]:
     """First field of a line, and its eight data fields, or four large ones."""
+    line = line.expandtabs(8) if " " in line else line.replace("\t", ",")
     count, width = (4, 16) if "*" in line[:8].partition(",")[0] else (8, 8)
     ends = [0, *range(8, 9 + width * count, width)]
     words = line.split(",") if "," in line else [line[a:b] for a, b in pairwise(ends)]
     words = [word.strip() for word in words[: count + 1]]
     return words + [""] * (count + 1 - len(words))
-
-
-def _lines(path: Path, level: int = 0) -> Iterator[str]:
-    """Lines without comments up to ENDDATA, with included files in their places."""
-    for raw in text_lines(path):
-        line = raw.partition("$")[0].rstrip()
-        line = line.expandtabs(8) if " " in line else line.replace("\t", ",")
-        if match := INCLUDE.match(line):
-            yield from _lines(include(path, match[1].strip(), level), level + 1)
-        elif line.upper().startswith("ENDDATA"):
-            return
-        elif line:
-            yield line
 
 
 def _number(word: str) -> float:

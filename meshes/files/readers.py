@@ -5,17 +5,20 @@ They crash on damaged files and print, so `read_contents` calls them in a separa
 
 import contextlib
 import io
+import re
+import tempfile
 import warnings
 from collections.abc import Iterator
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
-from meshes.files.abaqus import AGAIN, include, read_abaqus, text_lines
+from meshes.files.abaqus import AGAIN, expanded, include, read_abaqus
 from meshes.files.cells import Contents, contents
 from meshes.files.nastran import read_nastran
-from meshes.files.xdmf import read_xdmf
 from meshes.tetmesh import MeshError
 from meshes.typing import Floats
 
@@ -26,6 +29,7 @@ VTK_CELLS = {
     12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8",
     24: "tetra10", 25: "hexahedron20", 26: "wedge15", 27: "pyramid13",
 }  # fmt: skip
+XDMF_KINDS = {"Tetrahedron_10": "Tet_10", "Triangle_6": "Tri_6"}  # of dolfinx, and of VTK
 LAGRANGE = {69: {3: 5, 6: 22}, 71: {4: 10, 10: 24}}  # triangles and tetrahedra by nodes
 SOLID = 3  # dimension
 VOXEL, BRICK = 11, [0, 1, 3, 2, 4, 5, 7, 6]  # corners of a voxel in the order of a hexahedron
@@ -76,7 +80,7 @@ def _read(path: Path) -> Any:
     with contextlib.redirect_stderr(io.StringIO()):
         raw = getattr(meshio, BY_MESHIO[suffix]).read(str(path))
     families = getattr(raw, "cell_tags", {})  # of MED
-    raw.info = {"notes": [], "names": {int(n): ", ".join(names) for n, names in families.items()}}
+    raw.info = {"notes": [], "names": {n: ", ".join(names) for n, names in families.items()}}
     return raw
 
 
@@ -98,56 +102,42 @@ def _read_tetgen(path: Path) -> Any:
     import meshio
 
     nodes, cells = _numbers(path, ".node", 4), _numbers(path, ".ele", 3).astype(int)
-    most, attributes = (
-        (10 if cells.shape[1] > 10 else 4),
-        cells.shape[1] > 11 or cells.shape[1] == 6,
-    )
+    kind, most = ("tetra10", 10) if cells.shape[1] > 10 else ("tetra", 4)
+    region = {"region": [cells[:, -1]]} if cells.shape[1] > 1 + most else {}
+    tets = cells[:, 1 : 1 + most] - int(nodes[0, 0])
     return meshio.Mesh(
-        nodes[:, 1:4],
-        [("tetra" if most == 4 else "tetra10", cells[:, 1 : 1 + most] - int(nodes[0, 0]))],
-        cell_data={"region": [cells[:, -1]]} if attributes else {},
-        info={"notes": [], "names": {}},
+        nodes[:, 1:4], [(kind, tets)], cell_data=region, info={"notes": [], "names": {}}
     )
 
 
 def _numbers(path: Path, end: str, head: int) -> Floats:
     """The rows of numbers in one of TetGen's files, below a line of `head` numbers."""
-    lines = text_lines(include(path, path.with_suffix(end).name))
-    words = [word for line in lines for word in line.partition("#")[0].split()]
+    words = re.sub(r"#.*", "", expanded(include(path, path.with_suffix(end).name))).split()
     return np.array(words[head:], np.float64).reshape(int(words[0]), -1)
 
 
 def _read_vtk(path: Path) -> Any:
-    """The cells of all data sets of a VTK file. If several have solid cells, each is a region.
-
-    In XDMF files, grids may share the points of another one, and have the regions of its cells.
-    """
+    """The cells of all data sets of a VTK file. If several have solid cells, each is a region."""
     import meshio
     import pyvista
 
     is_xdmf = path.suffix.lower() in (".xdmf", ".xmf")
-    data, shared = read_xdmf(path) if is_xdmf else (pyvista.read(path), dict[str, bool]())
+    data, shared = _read_xdmf(path) if is_xdmf else (pyvista.read(path), dict[str, bool]())
     parts = [(name, _grid(path, part)) for name, part in _leaves(data, "") if part.n_points]
-    parts.sort(key=lambda each: each[0] in shared)
-    solid = list(dict.fromkeys(name for name, grid in parts if _kinds(grid, SOLID)))
-    tagged = [grid.n_cells for name, grid in parts if name in shared and name in solid]
-    solid = [name for name in solid if name not in shared]
-    points, first = [np.zeros((0, 3))], 0
+    kinds = {
+        k: pyvista.CellType(k) for _, grid in parts for k in np.unique(grid.celltypes).tolist()
+    }
+    solids = [k for k, kind in kinds.items() if kind.dimension == SOLID]
+    names = dict.fromkeys(name for name, grid in parts if np.isin(grid.celltypes, solids).any())
+    tagged = [grid.n_cells for name, grid in parts if name in shared and name in names]
+    solid = [name for name in names if name not in shared]
+    notes, first = [f"read {len(parts)} parts"] * (len(parts) > 1), 0
     blocks: list[tuple[str, np.ndarray, dict[str, np.ndarray]]] = []
-    notes = [f"read {len(parts)} parts"] * (len(parts) > 1)
     for part, grid in parts:
-        if part not in shared:
-            first = sum(map(len, points))
-            points.append(np.asarray(grid.points, np.float64))
-        for kind in [] if part not in shared and grid.n_cells in tagged else _kinds(grid):
-            own = grid.celltypes == kind
-            if kind not in VTK_CELLS:
-                name = pyvista.CellType(kind).name.lower().replace("_", " ")
-                if pyvista.CellType(kind).dimension == SOLID:
-                    raise MeshError(
-                        f"{path} has {own.sum():,} cells of type {name}, which cannot be split "
-                        "into tetrahedra; save it as tetrahedra"
-                    )
+        has_tags = part not in shared and grid.n_cells in tagged  # in another grid
+        for kind in [] if has_tags else np.unique(grid.celltypes).tolist():
+            own, name = grid.celltypes == kind, kinds[kind].name.lower().replace("_", " ")
+            if kind not in VTK_CELLS and kind not in solids:
                 notes.append(f"left out {own.sum():,} cells of type {name}")
                 continue
             arrays = {name: np.asarray(grid.cell_data[name])[own] for name in grid.cell_data}
@@ -156,10 +146,12 @@ def _read_vtk(path: Path) -> Any:
             elif len(solid) > 1 and part in solid:
                 arrays.setdefault("region", np.full(own.sum(), solid.index(part) + 1))
             nodes = np.asarray(grid.cells_dict[kind]) + first
-            blocks.append((VTK_CELLS[kind], nodes[:, BRICK] if kind == VOXEL else nodes, arrays))
+            nodes = nodes[:, BRICK] if kind == VOXEL else nodes
+            blocks.append((VTK_CELLS.get(kind, name), nodes, arrays))
+        first += grid.n_points
     flat = (name for _, _, arrays in blocks for name in arrays if arrays[name].ndim == 1)
     return meshio.Mesh(
-        np.vstack(points),
+        np.vstack([np.zeros((0, 3)), *(np.asarray(grid.points, np.float64) for _, grid in parts)]),
         [(kind, nodes) for kind, nodes, _ in blocks],
         cell_data={
             tag: [arrays.get(tag, np.zeros(len(nodes), int)) for _, nodes, arrays in blocks]
@@ -167,6 +159,42 @@ def _read_vtk(path: Path) -> Any:
         },
         info={"notes": notes, "names": {n: name for n, name in enumerate(solid, 1) if solid[1:]}},
     )  # fmt: skip
+
+
+def _read_xdmf(path: Path) -> tuple[Any, dict[str, bool]]:
+    """The content of a file, and the grids that have the points of another one, by name: whether
+    they have their own cells, as tags do. VTK's reader crashes on included elements.
+    """
+    import pyvista
+    from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+    root, shared = ElementTree.fromstring(path.read_bytes()), dict[str, bool]()
+    own = [grid for grid in root.iter("Grid") if grid.find("Geometry") is not None]
+    for outer in root.iter("Grid"):
+        for step, grid in enumerate((outer, *outer.findall("Grid"))):  # of a collection, or none
+            for link in [part for part in grid if part.tag.endswith("}include")]:
+                target = link.get("xpointer", "")
+                title = re.search(r"@Name=[\"'](.+?)[\"']", target)
+                named = (g for g in own if title and g.get("Name") == title[1])
+                parts = [part for part in next(named, own[0]) if part.tag in target]
+                grid.extend(map(deepcopy, parts))
+                grid.remove(link)
+                if step < 2:  # VTK reads the first of a collection
+                    names = (each.get("Name", "") for each in (outer, grid))
+                    shared |= dict.fromkeys(names, len(parts) == 1)
+    for cells in root.iter("Topology"):
+        kind = cells.get("TopologyType", "")
+        cells.set("TopologyType", XDMF_KINDS.get(kind, kind))
+    for item in root.iter("DataItem"):
+        if item.get("Format", "XML").upper() != "XML":  # but HDF or Binary, in another file
+            name, colon, inside = (item.text or "").strip().partition(":/")
+            item.text = f"{include(path.absolute(), name)}{colon}{inside}"
+    with tempfile.TemporaryDirectory() as folder:
+        reader = vtkXdmfReader()  # pyvista's reader requires time steps
+        reader.SetFileName(str(Path(folder, path.name)))
+        Path(folder, path.name).write_bytes(ElementTree.tostring(root))
+        reader.Update()
+        return pyvista.wrap(reader.GetOutputDataObject(0)), shared
 
 
 def _leaves(data: Any, name: str) -> Iterator[tuple[str, Any]]:
@@ -212,14 +240,6 @@ def _labelled(path: Path, image: Any) -> Any:
         f"{path} is an image of {image.n_cells:,} voxels, not a body; segment it, and save a "
         "surface, or whole numbers that are 0 outside the body"
     )
-
-
-def _kinds(grid: Any, dimension: int | None = None) -> list[int]:
-    """VTK's numbers of the cell types of a grid, all or those of one dimension."""
-    import pyvista
-
-    kinds = [int(kind) for kind in np.unique(grid.celltypes)]
-    return [k for k in kinds if dimension in (None, pyvista.CellType(k).dimension)]
 
 
 OWN = {

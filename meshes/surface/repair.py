@@ -23,6 +23,7 @@ from meshes.tetmesh import MeshError
 from meshes.typing import Floats, Ints
 
 MOST_OFF_PLANE = 0.1  # of the width of a hole: how far its edge may leave a plane to be capped
+SEAM = 0.3  # of the length of open edges: sides of a seam are closer to each other
 SAME_POINT = 1e-6  # of the diagonal: points nearer to each other than this are merged
 
 
@@ -70,18 +71,25 @@ def check_crossings(surface: Surface) -> None:
 
 
 def repaired(
-    points: ArrayLike, triangles: ArrayLike, *, keep_largest: bool = False, cap: bool = False
+    points: ArrayLike,
+    triangles: ArrayLike,
+    *,
+    keep_largest: bool = False,
+    cap: bool = False,
+    seam: float = 20e-6,
 ) -> tuple[Surface, list[str]]:
     """Repair seams, duplicates and orientation of a surface.
 
-    Coinciding points are merged. Triangles without three different corners, and duplicates, are
-    removed. The rest is oriented outwards.
+    Coinciding points are merged, and points on open edges that are close to each other. Triangles
+    without three different corners, and duplicates, are removed. The rest is oriented outwards.
 
     Parameters
     ----------
     points, triangles : (n, 3) float, m, and (k, 3) int
     keep_largest : keep only the piece with the largest area
     cap : close holes whose edges lie in a plane, such as an open wrist
+    seam : float, m, largest distance of points on open edges that are welded, and at most a quarter
+        of the median length of these edges
 
     Returns
     -------
@@ -102,6 +110,15 @@ def repaired(
     corners = number[raw.triangles]
     if (merged := len(number) - len(np.unique(number))) > 0:
         notes.append(f"merged {merged:,} points that coincide with others, as along seams")
+    ends, welded = _open_edges(corners), np.arange(len(number))
+    if len(rim := np.unique(ends)):
+        lengths = np.linalg.norm(raw.points[ends[:, 1]] - raw.points[ends[:, 0]], axis=1)
+        near = min(seam, float(np.median(lengths)) / 4)
+        welded[rim] = rim[first_coincident(raw.points[rim], near)]
+    if moved := int((welded != np.arange(len(number))).sum()):
+        widest = np.linalg.norm(raw.points[welded] - raw.points, axis=1).max()
+        notes.append(f"welded {moved:,} points along seams up to {1e6 * widest:.2g} um wide")
+    corners = welded[corners]
     a, b, c = corners.T
     proper = (a != b) & (b != c) & (c != a)
     if not proper.all():
@@ -111,7 +128,7 @@ def repaired(
     if len(first) < len(corners):
         notes.append(f"dropped {len(corners) - len(first):,} duplicate triangles")
     surface = compact(raw.points, corners[np.sort(first)])
-    if (unused := len(number) - merged - len(surface.points)) > 0:
+    if (unused := len(number) - merged - moved - len(surface.points)) > 0:
         notes.append(f"dropped {unused:,} unused points")
     if keep_largest and (n := n_pieces(surface)) > 1:
         piece = pieces(surface)
@@ -134,8 +151,7 @@ def _with_caps(surface: Surface, notes: list[str]) -> Surface:
     """Close holes by triangles between the points of their edges."""
     import pyvista
 
-    edges, count = np.unique(np.sort(_edges(surface), axis=1), axis=0, return_counts=True)
-    ends = edges[count == 1]
+    ends = _open_edges(surface.triangles)
     if not len(ends):
         notes.append("no hole to close")
         return surface
@@ -161,12 +177,14 @@ def _with_caps(surface: Surface, notes: list[str]) -> Surface:
     return Surface(points=np.asarray(closed.points, np.float64), triangles=new)
 
 
-def first_coincident(points: Floats) -> Ints:
-    """Return for each point (n, 3) the number (n,) of the first point at the same place."""
+def first_coincident(points: Floats, distance: float | None = None) -> Ints:
+    """Return for each point (n, 3) the number (n,) of the first point at the same place, or within
+    a distance of it.
+    """
     from scipy.spatial import cKDTree
 
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    near = cKDTree(points).query_pairs(SAME_POINT * diagonal, output_type="ndarray")
+    same = SAME_POINT * float(np.linalg.norm(np.ptp(points, axis=0)))
+    near = cKDTree(points).query_pairs(distance or same, output_type="ndarray")
     label = connected_components(len(points), near)
     _, first = np.unique(label, return_index=True)
     return np.asarray(first[label])
@@ -177,21 +195,45 @@ def _starts(surface: Surface) -> Ints:
     return surface.triangles.ravel()
 
 
-def _edges(surface: Surface) -> Ints:
-    """Points (3 k, 2) at the ends of each side."""
-    return surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+def _edges(triangles: Ints) -> Ints:
+    """Points (3 k, 2) at the ends of each side of triangles (k, 3)."""
+    return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+
+def _open_edges(triangles: Ints) -> Ints:
+    """Points (m, 2) at the ends of edges of one triangle only."""
+    edges, count = np.unique(np.sort(_edges(triangles), axis=1), axis=0, return_counts=True)
+    return edges[count == 1]
+
+
+def _gap(points: Floats, ends: Ints, samples: int = 9) -> tuple[float, float]:
+    """Median distance in m between open edges (m, 2), and over their length; inf for one edge."""
+    from scipy.spatial import cKDTree
+
+    a, b = points[ends].swapaxes(0, 1)
+    places = a[:, None] + np.linspace(0, 1, samples)[:, None] * (b - a)[:, None]
+    tree, middles = cKDTree(places.reshape(-1, 3)), places[:, samples // 2]
+    away, place = tree.query(middles, k=samples + 1)
+    own = place // samples == np.arange(len(ends))[:, None]
+    away = np.where(own, np.inf, away).min(axis=1)
+    return float(np.median(away)), float(np.median(away / np.linalg.norm(b - a, axis=1)))
 
 
 def _paired_edges(surface: Surface) -> Ints:
     """The two sides (m, 2) at each edge. Refuses edges with one or with more than two triangles."""
-    sides = np.sort(_edges(surface), axis=1)
+    sides = np.sort(_edges(surface.triangles), axis=1)
     keys = sides[:, 0] * len(surface.points) + sides[:, 1]
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     if (open_edges := first[count == 1]).size:
+        cure = "close plane holes, such as a wrist, with --cap, and other holes in the program"
+        width, share = _gap(surface.points, sides[open_edges])
+        if share < SEAM:
+            cure = (
+                f"this is a seam about {1e6 * width:.3g} um wide, so merge its sides in the program"
+            )
         raise MeshError(
             f"the surface is open along {len(open_edges):,} of its {len(first):,} edges, first "
-            f"near {_at(surface, open_edges[0])}; close plane holes, such as a wrist, with "
-            "--cap, and other holes in the program that made it"
+            f"near {_at(surface, open_edges[0])}; {cure} that made it"
         )
     if (crowded := first[count > 2]).size:
         raise MeshError(
