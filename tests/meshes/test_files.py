@@ -636,6 +636,165 @@ def test_voxels_are_split_as_the_hexahedra_that_they_are(tmp_path, read_here):
     assert meshes.corner_volumes(mesh.points, mesh.tets).sum() == pytest.approx(48 * 0.0254**3)
 
 
+UPPER = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
+XDMF = """<?xml version="1.0"?>
+<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []>
+<Xdmf Version="3.0" xmlns:xi="https://www.w3.org/2001/XInclude"><Domain>
+<Grid Name="mesh" GridType="Uniform"><Topology TopologyType="Tetrahedron" NumberOfElements="{n}">
+<DataItem Dimensions="{n} 4" NumberType="Int" Format="HDF">a.h5:/tets</DataItem></Topology>
+<Geometry GeometryType="XYZ"><DataItem Dimensions="{p} 3" Format="HDF">a.h5:/points</DataItem>
+</Geometry></Grid>
+<Grid Name="cells" GridType="Uniform"><xi:include xpointer="xpointer({link}/Geometry)" />
+<Topology TopologyType="Tetrahedron" NumberOfElements="{n}">
+<DataItem Dimensions="{n} 4" NumberType="Int" Format="HDF">a.h5:/tets</DataItem></Topology>
+<Attribute Name="cells" AttributeType="Scalar" Center="Cell">
+<DataItem Dimensions="{n} 1" Format="HDF">a.h5:/tags</DataItem></Attribute></Grid>
+<Grid Name="facets" GridType="Uniform"><xi:include xpointer="xpointer({link}/Geometry)" />
+<Topology TopologyType="Triangle" NumberOfElements="{k}">
+<DataItem Dimensions="{k} 3" NumberType="Int" Format="HDF">a.h5:/top</DataItem></Topology>
+<Attribute Name="facets" AttributeType="Scalar" Center="Cell">
+<DataItem Dimensions="{k} 1" Format="HDF">a.h5:/five</DataItem></Attribute></Grid>
+</Domain></Xdmf>"""
+
+
+@pytest.mark.parametrize("link", ["/Xdmf/Domain/Grid", "/Xdmf/Domain/Grid[@Name='mesh']"])
+def test_tags_of_cells_and_facets_in_xdmf_are_regions_and_facet_sets(tmp_path, link):
+    h5py, top = pytest.importorskip("h5py"), SLAB.facets["top"]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["tets"], file["points"], file["top"] = SLAB.tets, SLAB.points, top
+        file["tags"] = np.where(UPPER, 1, 2)[:, None].astype(np.int32)
+        file["five"] = np.full((len(top), 1), 5, np.int32)
+    text = XDMF.format(n=len(SLAB.tets), p=len(SLAB.points), k=len(top), link=link)
+    (tmp_path / "a.xdmf").write_text(text)
+    mesh, said = import_body(tmp_path / "a.xdmf")
+    np.testing.assert_array_equal(mesh.region, np.where(UPPER, 1, 2))
+    assert volume_of(mesh) == pytest.approx(19.2)
+    assert len(mesh.facets["group 5"]) == len(top)
+    assert not said_of(said, "duplicate")
+    (tmp_path / "a.h5").unlink()
+    assert "'a.h5', which is missing" in refused(tmp_path / "a.xdmf")
+
+
+def test_regions_are_read_under_any_name_and_others_noted(tmp_path):
+    grid = grid_of(SLAB.points, {TETRAHEDRON: SLAB.tets})
+    numbers = np.where(UPPER, 1.0, 2.0)
+    for name, values in [
+        ("stress", np.linspace(0, 1, len(numbers))), ("rank", numbers), ("signed", -numbers),
+        ("ids", np.arange(len(numbers))), ("name_to_read", numbers), ("grain", 3 - numbers),
+    ]:  # fmt: skip
+        grid.cell_data[name] = values
+    grid.save(tmp_path / "a.vtu")
+    mesh, said = import_body(tmp_path / "a.vtu")
+    np.testing.assert_array_equal(mesh.region, numbers)
+    assert said_of(said, "regions are the numbers in the cell array name_to_read")
+    assert said_of(said, "left out the cell arrays signed, grain")
+
+
+def bulk_data(fields, head, tail, start=""):
+    rows = [["GRID", i, "", *xyz] for i, xyz in enumerate((1e3 * SLAB.points).tolist(), 1)]
+    rows += [["CTETRA", i, 1 + (not up), *nodes] for i, (up, nodes) in
+             enumerate(zip(UPPER, (SLAB.tets + 1).tolist(), strict=True), 1)]  # fmt: skip
+    return start + head + "".join(map(fields, rows)) + tail
+
+
+def small_fields(row):
+    cells = (f"{x:.4f}"[:7] if isinstance(x, float) else str(x) for x in row)
+    return "".join(f"{cell:8}" for cell in cells) + "\n"
+
+
+def large_fields(row):
+    name, *cells = (f"{x:.8E}" if isinstance(x, float) else str(x) for x in row)
+    lines = ["".join(f"{cell:>16}" for cell in cells[i : i + 4]) for i in (0, 4)]
+    return f"{name + '*':8}{lines[0]}*\n*       {lines[1]}\n"
+
+
+@pytest.mark.parametrize(
+    ("fields", "head", "tail"),
+    [
+        (small_fields, "$ to be included\n", ""),
+        (large_fields, "SOL 101\nCEND\nBEGIN BULK\nPSOLID,1,1\n", "CBAR,999,3,1,2\nENDDATA\n"),
+        (lambda row: ",".join(map(str, row)).lower() + "\n", "begin bulk\n", "enddata\n"),
+        (lambda row: "\t".join(map(str, row)) + "\n", "", "CTRIA3,998,9,1,2,3,,0.5\n"),
+    ],
+)
+def test_nastran_is_read_in_all_fields_with_or_without_a_head(tmp_path, fields, head, tail):
+    (tmp_path / "part.inc").write_text(bulk_data(fields, "", tail))
+    (tmp_path / "a.bdf").write_text(f"{head}INCLUDE 'part.inc'\n")
+    (tmp_path / "b.nas").write_text(bulk_data(fields, head, tail))
+    for name in ("a.bdf", "b.nas"):
+        mesh, _ = import_body(tmp_path / name, unit="mm")
+        assert volume_of(mesh) == pytest.approx(19.2)
+        np.testing.assert_array_equal(mesh.region, np.where(UPPER, 1, 2))
+
+
+@pytest.mark.parametrize(("order", "base"), [(1, 0), (2, 1)])
+def test_tetgen_files_of_both_orders_are_read(tmp_path, order, base):
+    mesh = meshes.block((0.04, 0.04, 0.012), 0.010, order=order)
+    order_of = [0, 1, 2, 3, 8, 5, 7, 9, 6, 4][: mesh.tets.shape[1]]  # some other node order
+    nodes = [f"{i + base} {x} {y} {z}" for i, (x, y, z) in enumerate(mesh.points.tolist())]
+    cells = [
+        f"{i + base}  {' '.join(map(str, (tet + base)[order_of]))}  {7 if up else 3}"
+        for i, (tet, up) in enumerate(zip(mesh.tets, UPPER, strict=True))
+    ]
+    (tmp_path / "a.1.node").write_text("\n".join([f"# x\n{len(nodes)}  3  0  0", *nodes]))
+    head = f"{len(cells)}  {mesh.tets.shape[1]}  1"
+    (tmp_path / "a.1.ele").write_text("\n".join([head, *cells, "# Generated by tetgen"]))
+    read, _ = import_body(tmp_path / "a.1.ele")
+    assert read.order == order
+    assert volume_of(read) == pytest.approx(19.2)
+    np.testing.assert_array_equal(read.region, np.where(UPPER, 7, 3))
+
+
+def test_lagrange_tetrahedra_are_read(tmp_path):
+    for order, mesh in ((1, SLAB), (2, meshes.quadratic(SLAB))):
+        nodes = mesh.tets.shape[1]
+        cells = np.insert(mesh.tets, 0, nodes, axis=1).ravel()
+        kinds = np.full(len(mesh.tets), pyvista.CellType.LAGRANGE_TETRAHEDRON, np.uint8)
+        pyvista.UnstructuredGrid(cells, kinds, mesh.points).save(tmp_path / "a.vtu")
+        read, _ = import_body(tmp_path / "a.vtu")
+        assert read.order == order
+        assert volume_of(read) == pytest.approx(19.2)
+
+
+@pytest.mark.parametrize("centre", ["cell", "point"])
+def test_of_a_label_image_the_voxels_with_a_label_are_read(tmp_path, centre):
+    image = pyvista.ImageData(dimensions=(13, 13, 7), spacing=(0.005, 0.005, 0.004))
+    centres = image if centre == "point" else image.cell_centers()
+    x, y, z = (centres.points - np.array(image.center)).T
+    inside = (np.abs(x) < 0.021) & (np.abs(y) < 0.021) & (np.abs(z) < 0.009)
+    labels = np.where(inside, np.where(x > 0, 4, 2), 0).astype(np.int16)
+    (image.cell_data if centre == "cell" else image.point_data)["label"] = labels
+    image.save(tmp_path / "a.vtk")
+    mesh, _ = import_body(tmp_path / "a.vtk")
+    assert volume_of(mesh) == pytest.approx(inside.sum() * 0.1)
+    assert set(mesh.region.tolist()) == {2, 4}
+
+
+def test_sound_files_that_are_not_read_name_what_is_not(tmp_path):
+    image = pyvista.ImageData(dimensions=(5, 5, 5))
+    image.point_data["density"] = np.linspace(0, 1, 125)
+    image.save(tmp_path / "image.vtk")
+    pyvista.PolyData(SLAB.points).save(tmp_path / "cloud.ply")
+    lines = "".join(f"v {x} {y} {z}\n" for x, y, z in SLAB.points.tolist())
+    (tmp_path / "cloud.obj").write_text(lines)
+    head, nodes = "$MeshFormat\n{} 0 8\n$EndMeshFormat\n", "1 0 0 0 3 1 0 0 0\n"
+    tail = "$Elements\n0\n$EndElements\n"
+    (tmp_path / "two.msh").write_text(
+        head.format(2.2) + f"$ParametricNodes\n1\n{nodes}$EndParametricNodes\n{tail}"
+    )
+    (tmp_path / "four.msh").write_text(
+        head.format(4.1) + f"$Nodes\n1 1 1 1\n3 1 1 1\n1\n0 0 0 0 0 0\n$EndNodes\n{tail}"
+    )
+    for name, words in [
+        ("image.vtk", "an image of 64 voxels, not a body"),
+        ("cloud.ply", "points without triangles"),
+        ("cloud.obj", "points without triangles"),
+        ("two.msh", "parametric nodes"),
+        ("four.msh", "parametric nodes"),
+    ]:
+        assert words in refused(tmp_path / name)
+
+
 def test_negative_families_of_cells_are_regions_with_names():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1.0]])
     raw = meshio.Mesh(

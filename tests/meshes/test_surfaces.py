@@ -142,6 +142,25 @@ def test_common_defects_are_repaired():
         assert len(surface.triangles) == len(SPHERE.triangles)
 
 
+@pytest.mark.parametrize("gap", [1e-7, 1e-6, 1e-5, 5e-5])
+def test_seams_are_welded_or_told_from_holes(gap):
+    points, triangles = SPHERE.points, SPHERE.triangles
+    left = points[triangles].mean(axis=1)[:, 0] < 0
+    apart = np.vstack([points, points + [gap, 0, 0]])
+    halves = np.vstack([triangles[left], triangles[~left] + len(points)])
+    if gap < 2e-5:
+        surface, said = repaired(apart, halves)
+        check(surface)
+        assert volume(surface) == pytest.approx(volume(SPHERE), rel=2 * gap / 0.01)
+        assert f"up to {1e6 * gap:.2g} um wide" in said[0]
+        return
+    with pytest.raises(MeshError, match="a seam about 50 um wide") as error:
+        repaired(apart, halves)
+    assert "--cap" not in str(error.value)
+    with pytest.raises(MeshError, match="--cap"):
+        repaired(points, triangles[left])
+
+
 def test_sound_surfaces_do_not_cross_themselves():
     for surface in (SPHERE, cube()):
         assert not len(self_intersections(surface))

@@ -8,10 +8,13 @@ from functools import partial
 import numpy as np
 import pytest
 from corpus import FREE, SHORT
+from scipy.integrate import simpson
+from scipy.special import i0, i1, j0, j1
 
 import skinwave.planning.extent
 from bench.plans import MOST, stated_and_true
 from simple_model import Effort, Material, MovingPressure, Tacton, Trajectory
+from simple_model.load.spectrum import load_lines
 from skinwave import SkinwaveWarning, loads, simulate
 from skinwave.bodies.build import build
 from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
@@ -20,7 +23,7 @@ from skinwave.bodies.supports import Mounting
 from skinwave.models import named
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
-from skinwave.planning.estimates import cutoff_frequency, side_reflections
+from skinwave.planning.estimates import NO_BOUND, cutoff_frequency, side_reflections
 from skinwave.planning.extent import absorbing_error, extent
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import (
@@ -145,6 +148,60 @@ def test_the_estimated_reflections_bound_the_true_ones(material, width, duration
     found = compare(compute(scene, "fem", h=h), compute(scene, "flat-body")).relative_l2
     assert low < found.max() < 1.5 * returned
     assert returned < 6 * found.max()
+
+
+THIN = """
+[tacton]
+am_frequency_hz = 1361
+duration_s = 0.05
+[focus]
+drive = "linear"
+profile = "gaussian"
+[body]
+kind = "disc"
+size_x_mm = 40
+size_y_mm = 40
+thickness_mm = 1
+base = "free"
+sides = "clamped"
+[body.material]
+density_kg_m3 = 1200
+young_modulus_pa = 3e9
+poisson = 0.3
+viscosity_pa_s = 100
+[probes]
+points_mm = [[0, 0]]
+"""
+
+
+def clamped_disc(scene):
+    """Amplitude in m at the middle of a clamped circular plate, by its modes (Leissa 1969)."""
+    body, f = scene.body, scene.tacton.am_frequency
+    a, omega = body.width / 2, 2 * np.pi * f
+    stiffness = body.bending_stiffness * (1 + 1j * omega * 100 / body.solid.shear_modulus)
+    grid = np.linspace(1, 40, 4000)
+    value = j0(grid) * i1(grid) + i0(grid) * j1(grid)
+    turns = np.flatnonzero(value[1:] * value[:-1] < 0)
+    r = np.linspace(0, a, 2001)
+    spot = scene.pressure.spot(np.column_stack([r, 0 * r, 0 * r]), np.zeros((1, 2)))[0]
+    total = 0.0
+    for k in (grid[turns] + grid[turns + 1]) / 2:
+        shape = j0(k * r / a) - j0(k) / i0(k) * i0(k * r / a)
+        force = simpson(shape * spot * r, x=r) / simpson(shape**2 * r, x=r)
+        total += shape[0] * force / (stiffness * (k / a) ** 4 - body.mass_per_area * omega**2)
+    return abs(total) * load_lines(scene.pressure, 1e-6).strengths[-1]
+
+
+def test_thin_bodies_have_wide_elements_and_a_band_for_their_load():
+    scene = loads(THIN)
+    planned = plan(scene, SolveOptions(tolerance=0.4))
+    assert planned.h > 0.5 * scene.body.depth
+    assert planned.error < 0.4  # without the motion above 1 kHz
+    steady = compute(scene, "fem-harmonic", h=planned.h).values
+    true = clamped_disc(scene)
+    assert np.ptp(steady) / 2 == pytest.approx(true, rel=0.02)
+    slab = loads(THIN.replace('"disc"', '"slab"'))
+    assert side_reflections(slab) == NO_BOUND  # at 1361 Hz, too
 
 
 def test_a_quantity_that_converges_at_the_order_of_the_controller_is_extrapolated_exactly():

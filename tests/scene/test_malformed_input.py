@@ -158,6 +158,11 @@ def test_varied_keys_of_many_parts_are_refused(folder, capsys, name):
     [
         ("quality_factor = 20", "write loss_factor = 1 / Q = 0.05"),
         ("damping_ratio = 0.025", "write loss_factor = 2 zeta = 0.05"),
+        ("tan_delta = 0.3", "write loss_factor = tan(delta) = 0.3"),
+        ("rayleigh_alpha = 30", "write loss_factor = alpha / (2 pi f) at the frequency f"),
+        ("rayleigh_beta = 1e-4", "write loss_factor = 2 pi f beta at the frequency f"),
+        ("rayleigh = [30, 1e-4]", "write loss_factor = alpha / (2 pi f) + 2 pi f beta"),
+        ("density_kg_m3 = 998\nshear_modulus_pa = 0\npoisson = 0.49", "fluids are not modelled"),
         ("shear_modulus_kpa = 25", "write shear_modulus_pa = 1000 x shear_modulus_kpa = 25000"),
         ("density_g_cm3 = 1.1", "write density_kg_m3 = 1000 x density_g_cm3 = 1100"),
         ("poisson_ratio = 0.4", "did you mean 'poisson'?"),
