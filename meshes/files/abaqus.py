@@ -5,6 +5,7 @@ instances, and keeps only the last of several node blocks.
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -18,10 +19,7 @@ from meshes.reading import read_exported_text
 from meshes.tetmesh import MeshError
 from meshes.typing import Floats
 
-SOLIDS = {
-    4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15",
-    20: "hexahedron20", 27: "hexahedron27",
-}  # fmt: skip
+SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10"}  # by nodes
 FACES = {3: "triangle", 4: "quad"}
 # Keywords that generate, copy or move nodes and elements.
 GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
@@ -86,8 +84,6 @@ def expanded(path: Path, pattern: str = "(?!)", level: int = 0) -> str:
 
     try:
         return re.sub(pattern, other, read_exported_text(path, LARGEST))
-    except MeshError:
-        raise
     except ValueError as error:
         raise MeshError(str(error)) from None
 
@@ -154,18 +150,16 @@ def join_parts(path: Path, placed: list[tuple[Part, Rows]]) -> Any:
     cells: dict[str, list[list[int]]] = {}
     regions: dict[str, list[int]] = {}
     names: dict[str, int] = {}
-    left_out: dict[str, int] = {}
+    left_out: list[str] = []
     notes: list[str] = []
-    first = 0
     for part, rows in placed:
-        number = {node: first + i for i, node in enumerate(part.nodes)}
-        first += len(number)
+        number = dict(zip(part.nodes, count(sum(map(len, points))), strict=False))
         points.append(_move(path, np.array(list(part.nodes.values())).reshape(-1, 3), rows))
         region = _regions(part, names, notes)
         for element, (kind, nodes) in part.elements.items():
             name = _kind(kind, len(nodes))
             if name is None:
-                left_out[kind] = left_out.get(kind, 0) + 1
+                left_out.append(kind)
                 continue
             try:
                 cells.setdefault(name, []).append([number[node] for node in nodes])
@@ -175,7 +169,7 @@ def join_parts(path: Path, placed: list[tuple[Part, Rows]]) -> Any:
                 ) from None
             regions.setdefault(name, []).append(region.get(element, 0))
     notes = list(dict.fromkeys(notes))  # instances of one part have the same notes
-    notes += [f"left out {number:,} elements of type {kind}" for kind, number in left_out.items()]
+    notes += [f"left out {n:,} elements of type {kind}" for kind, n in Counter(left_out).items()]
     if len(placed) > 1:
         notes.append(f"read {len(placed)} parts or instances of parts")
     return meshio.Mesh(
@@ -208,7 +202,10 @@ def _regions(part: Part, names: dict[str, int], notes: list[str]) -> dict[int, i
     sets = {title: members for title, members in part.sets.items() if title and members}
     sections, blocks = ([t for t in titles if t in sets] for titles in (part.sections, part.blocks))
     others = [title for title in sets if title not in blocks]
-    families = [titles for titles in (others, blocks) if _is_partition(part, sets, titles)]
+    families = [
+        titles for titles in (others, blocks)
+        if sorted(e for title in titles for e in sets[title]) == sorted(part.elements)
+    ]  # fmt: skip
     chosen = list(dict.fromkeys(sections or (families or [blocks])[0]))
     if unused := [title for title in sets if title not in chosen]:
         notes.append(f"element sets that are not regions: {', '.join(unused)}")
@@ -217,12 +214,6 @@ def _regions(part: Part, names: dict[str, int], notes: list[str]) -> dict[int, i
         number = int(title) if title.isdigit() else 1
         names[title] = next(n for n in count(number) if n not in names.values())
     return {element: names[title] for title, members in regions.items() for element in members}
-
-
-def _is_partition(part: Part, sets: dict[str, set[int]], titles: list[str]) -> bool:
-    """Whether sets contain each element of a part once."""
-    members = [element for title in titles for element in sets[title]]
-    return len(members) == len(part.elements) and set(members) == set(part.elements)
 
 
 def _move(path: Path, points: Floats, rows: Rows) -> Floats:

@@ -27,7 +27,7 @@ BY_VTK = (
     ".ply", ".obj", ".glb", ".gltf",
 )  # fmt: skip
 FORMATS = (*BY_VTK, *BY_MESHIO, *OWN)
-SEVERAL_FILES = (".pvtu", ".vtm", ".xdmf", ".xmf", ".gltf")  # which name other files
+SEVERAL_FILES = (".pvtu", ".vtm", ".xdmf", ".xmf", ".gltf", *OWN)  # which name other files
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # gmsh cannot read the version 4.1 of meshio
 

@@ -27,7 +27,7 @@ OTHERWISE = "save it as .vtu (ParaView, meshio convert) or .msh (gmsh)"
 VTK_CELLS = {
     1: "vertex", 3: "line", 5: "triangle", 9: "quad", 10: "tetra", 11: "hexahedron",
     12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8",
-    24: "tetra10", 25: "hexahedron20", 26: "wedge15", 27: "pyramid13",
+    24: "tetra10",
 }  # fmt: skip
 XDMF_KINDS = {"Tetrahedron_10": "Tet_10", "Triangle_6": "Tri_6"}  # of dolfinx, and of VTK
 LAGRANGE = {69: {3: 5, 6: 22}, 71: {4: 10, 10: 24}}  # triangles and tetrahedra by nodes
@@ -101,19 +101,19 @@ def _read_tetgen(path: Path) -> Any:
     """Nodes and tetrahedra of 4 or 10 nodes; the last attribute of a tetrahedron is its region."""
     import meshio
 
-    nodes, cells = _numbers(path, ".node", 4), _numbers(path, ".ele", 3).astype(int)
-    kind, most = ("tetra10", 10) if cells.shape[1] > 10 else ("tetra", 4)
-    region = {"region": [cells[:, -1]]} if cells.shape[1] > 1 + most else {}
-    tets = cells[:, 1 : 1 + most] - int(nodes[0, 0])
+    (_, nodes), (most, cells) = _numbers(path, ".node", 4), _numbers(path, ".ele", 3)
+    tets = cells[:, 1 : 1 + most].astype(int) - int(nodes[0, 0])
     return meshio.Mesh(
-        nodes[:, 1:4], [(kind, tets)], cell_data=region, info={"notes": [], "names": {}}
-    )
+        nodes[:, 1:4], [("tetra" if most == 4 else f"tetra{most}", tets)],
+        cell_data={"region": [cells[:, -1].astype(int)]} if cells.shape[1] > 1 + most else {},
+        info={"notes": [], "names": {}},
+    )  # fmt: skip
 
 
-def _numbers(path: Path, end: str, head: int) -> Floats:
-    """The rows of numbers in one of TetGen's files, below a line of `head` numbers."""
+def _numbers(path: Path, end: str, head: int) -> tuple[int, Floats]:
+    """The second of `head` numbers in the first line of one of TetGen's files, and its rows."""
     words = re.sub(r"#.*", "", expanded(include(path, path.with_suffix(end).name))).split()
-    return np.array(words[head:], np.float64).reshape(int(words[0]), -1)
+    return int(words[1]), np.array(words[head:], np.float64).reshape(int(words[0]), -1)
 
 
 def _read_vtk(path: Path) -> Any:
