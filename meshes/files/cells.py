@@ -194,13 +194,17 @@ def _tag(arrays: Arrays, solid: list[str], notes: list[str]) -> str:
     """Name of the cell array with the regions of solid cells, or "": one of the usual names, or the
     first with a few whole numbers.
     """
-    numbers = {name: np.concatenate([own[kind] for kind in solid]) for name, own in arrays.items()}
-    usual = [name for name in NUMBERED if name in arrays]
+    every = {name: np.concatenate([own[kind] for kind in solid]) for name, own in arrays.items()}
+    numbers = {
+        name: x for name, x in every.items()
+        if x.ndim == 1 and (np.floor(x) == x).all() and np.abs(x).max() < 2**31
+    }  # fmt: skip
+    usual = [name for name in NUMBERED if name in numbers]
     if usual and (usual[0] != PHYSICAL or numbers[PHYSICAL].any()):
         return usual[0]
     several = [
-        name for name, x in numbers.items() if not NO_REGIONS.match(name) and x.ndim == 1
-        and (np.floor(x) == x).all() and 1 < len(np.unique(x)) <= len(x) / 2
+        name for name, x in numbers.items()
+        if not NO_REGIONS.match(name) and 1 < len(np.unique(x)) <= len(x) / 2
     ]  # fmt: skip
     found = next((name for name in several if numbers[name].min() >= 0), "")
     if found:

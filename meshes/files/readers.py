@@ -149,7 +149,7 @@ def _read_vtk(path: Path) -> Any:
             nodes = nodes[:, BRICK] if kind == VOXEL else nodes
             blocks.append((VTK_CELLS.get(kind, name), nodes, arrays))
         first += grid.n_points
-    flat = (name for _, _, arrays in blocks for name in arrays if arrays[name].ndim == 1)
+    flat = (name for _, _, arrays in blocks for name, x in arrays.items() if x.dtype.kind in "biuf")
     return meshio.Mesh(
         np.vstack([np.zeros((0, 3)), *(np.asarray(grid.points, np.float64) for _, grid in parts)]),
         [(kind, nodes) for kind, nodes, _ in blocks],
