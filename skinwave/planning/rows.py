@@ -117,7 +117,7 @@ def coat_rows(body: Body, h: float) -> list[PlanRow]:
         rows.append(PlanRow(what="coat", value=" and ".join(names[:coated]), reason=reason))
     if names[coated:]:
         why = (
-            "the elements of a slab may be as flat as its layers"
+            "elements may be as flat as layers"
             if body.of_kind.conforming
             else f"they are at least half an element of {1e3 * h:.3g} mm thick"
         )
