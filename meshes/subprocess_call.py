@@ -3,6 +3,7 @@
 For work that may crash, print or never end: file readers, the mesher, the probe of OpenGL.
 """
 
+import gc
 import os
 import pickle
 import signal
@@ -101,6 +102,7 @@ def _serve() -> None:
 
         if memory:  # data, not address space, because VTK maps more memory than it uses
             resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    gc.disable()  # it would take most of the time of readers that make many lists
     function, args = pickle.loads((folder / "call").read_bytes())
     try:
         answer = pickle.dumps((function(*args), None), pickle.HIGHEST_PROTOCOL)
