@@ -31,12 +31,16 @@ class LineSolver:
     ----------
     operators : Operators
     solver : backend of `factorise`
+    accuracy : largest residual over the force
     """
 
-    def __init__(self, operators: Operators, solver: str = "auto") -> None:
+    def __init__(
+        self, operators: Operators, solver: str = "auto", *, accuracy: float = 1e-10
+    ) -> None:
         self._laws, self._operators = operators.combinations(), operators
         rests = [part.rest for part in self._laws.parts if part.rest is not None]
-        self._factorise = SumFactoriser([operators.K, operators.M, *rests], backend=solver)
+        matrices = [operators.K, operators.M, *rests]
+        self._factorise = SumFactoriser(matrices, backend=solver, accuracy=accuracy)
 
     def __call__(self, frequency: float, force: Any) -> Complex:
         """Return the complex displacement (3 n,) or (3 n, k) in m at a frequency in Hz under forces

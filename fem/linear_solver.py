@@ -20,7 +20,7 @@ from fem.pardiso import Pardiso, PardisoError, mkl
 from fem.sparsity import on_one_pattern, upper_triangle
 from fem.typing import Array, Ints
 
-REFINED, SLOWEST = 1e-10, 0.2  # residual over the right-hand side, and over the last residual
+SLOWEST = 0.2  # residual over the last one
 BACKENDS = ("pardiso", "superlu")
 
 
@@ -121,12 +121,18 @@ class SumFactoriser:
     PARDISO analyses the union of their patterns once. Factors are in single precision, with
     refinement in double precision, which needs half the memory and two thirds of the time. If
     refinement does not converge, as for thin sheets, this matrix and all later ones are factorised
-    in double precision.
+    in double precision. `accuracy` is the largest residual over the right-hand side.
     """
 
-    def __init__(self, matrices: Sequence[sparse.csr_array], *, backend: str = "auto") -> None:
+    def __init__(
+        self,
+        matrices: Sequence[sparse.csr_array],
+        *,
+        backend: str = "auto",
+        accuracy: float = 1e-10,
+    ) -> None:
         self._values, self._indices, self._indptr = on_one_pattern(matrices)
-        self._backend, self._is_single = backend, True
+        self._backend, self._is_single, self._accuracy = backend, True, accuracy
         self._matrix: Pardiso | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -150,7 +156,10 @@ class SumFactoriser:
 
     def _solve(self, matrix: Pardiso, values: Array, b: Array) -> Array:
         if self._is_single:
-            x = _refine(self._upper(values), lambda r: matrix.solve(r.astype(np.complex64)), b)
+            solve = matrix.solve
+            x = _refine(
+                self._upper(values), lambda r: solve(r.astype(np.complex64)), b, self._accuracy
+            )
             if x is not None:
                 return x
             self._is_single = False
@@ -167,7 +176,9 @@ class SumFactoriser:
         return Pardiso(self._indices + one, self._indptr + one, 6, single=self._is_single)
 
 
-def _refine(upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array) -> Array | None:
+def _refine(
+    upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array, accuracy: float
+) -> Array | None:
     """Refine an approximate `solve` of a symmetric matrix; None if that does not converge."""
     x, r, size = np.zeros_like(b), b, np.linalg.norm(b, axis=0)
     lower, diagonal, before = upper.T, upper.diagonal().reshape(-1, *[1] * (b.ndim - 1)), size
@@ -175,7 +186,7 @@ def _refine(upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array) 
         x = x + solve(r)
         r = b - (upper @ x + lower @ x - diagonal * x)
         now = np.linalg.norm(r, axis=0)
-        if (now <= REFINED * size).all():
+        if (now <= accuracy * size).all():
             return x
         if not (now <= SLOWEST * before).all():
             return None

@@ -373,6 +373,6 @@ def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats,
 
     furthest = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
     steps = spline_steps(furthest / width)
-    table = width / STEPS_PER_WIDTH * np.arange(steps)
+    table: Floats = width / STEPS_PER_WIDTH * np.arange(steps, dtype=np.float64)
     flat = (1, np.zeros(steps))
     return table, CubicSpline(table, np.eye(steps), bc_type=(flat, "not-a-knot"))

@@ -18,8 +18,9 @@ def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     add_scenes(parser, "skin-slab, paper-sheet and palm")
     parser.add_argument(
-        "--no-selftest", action="store_true", help="leave out the data of live.html#selftest"
-    )
+        "--no-selftest", dest="tests", action="store_const", const=0, default=60,
+        help="leave out the data of live.html#selftest",
+    )  # fmt: skip
     add_output(parser, "FILE", f"file to write (default: {OUT})")
     parser.set_defaults(out=OUT)
 
@@ -35,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
         output_file(options.out, overwrite=options.overwrite, inputs=inputs) as file,
         progress_of(options) as progress,
     ):
-        data = data_of(scenes, progress, **({"tests": 0} if options.no_selftest else {}))
+        data = data_of(scenes, progress, tests=options.tests)
         size = file.write(page(data).encode())
     bodies = [record["title"] for record in data["bodies"]]
     summary = {"out": str(options.out), "bytes": size, "bodies": bodies}

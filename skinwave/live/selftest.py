@@ -9,6 +9,7 @@ from fem.load_and_probe import on_surface
 from simple_model import SUPERPOSITIONS, MovingPressure, Tacton, Trajectory, even_phases
 from simple_model.layers.flat_body import steady_lines
 from skinwave.bodies.analytic import compliance
+from skinwave.live.elements import BAND
 from skinwave.live.packs import pack_method
 from skinwave.live.radial import LOWEST
 from skinwave.live.values import control_values
@@ -26,7 +27,7 @@ SEED = 15
 # Compared lines: smallest amplitude relative to the largest at the point, highest frequency in Hz,
 # and fewest of a Tacton. The pack of a body of elements is less accurate.
 SMALLEST, HIGHEST, FEWEST = 0.01, 1000.0, 3
-SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS, FEWEST_OF_ELEMENTS = 0.3, 200.0, 1
+SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS, FEWEST_OF_ELEMENTS = 0.1, BAND, 1
 SHAPES = ("point", "line", "circle", "triangle", "square")
 DRIVES = ("pressure_squared", "force_corrected", "linear")
 # Places in m at which the exact model of a body of elements is prepared.

@@ -68,8 +68,9 @@ export function linesTable(answer, pinned) {
   };
   const columns = [["Line"], ["Hz"], ["Kernel, Pa"], [`Waves, ${unit}`, "waves-ink"],
     ...(pinned ? [["A", "of-a"]] : []), ['<abbr title="dB above the detection threshold">dB SL</abbr>']];
+  const mark = (f) => (f > answer.body.band_hz ? "≈ " : ""); // beyond the frequencies of the stated error
   return table(columns, lineTable(answer).map(({ name: line, f, pressure, motion, level }) => [
-    subscript(typeset(line)) || NONE, f.toFixed(1), rounded(pressure), rounded(per * motion),
+    subscript(typeset(line)) || NONE, f.toFixed(1), rounded(pressure), mark(f) + rounded(per * motion),
     ...(pinned ? [ofA(f)] : []), level === null ? NONE : signed(level)]));
 }
 

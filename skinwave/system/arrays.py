@@ -1,4 +1,4 @@
-"""Arrays as text in JSON: 64-bit floats, or 16-bit integers with a scale for each row."""
+"""Arrays as text in JSON: 64-bit floats, or integers of 16 or 12 bits with a scale for each row."""
 
 import base64
 from typing import Any
@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 Packed = dict[str, Any]
-LARGEST = 32767
 
 
 def pack(values: np.ndarray) -> Packed:
@@ -16,15 +15,16 @@ def pack(values: np.ndarray) -> Packed:
     return found if np.iscomplexobj(rows) else found | {"real": True}
 
 
-def quantise(values: np.ndarray) -> Packed:
-    """Encode real or complex rows (n, m) as 16-bit integers relative to the largest of each row."""
+def quantise(values: np.ndarray, bits: int = 16) -> Packed:
+    """Encode real or complex rows (n, m) as integers of 16 or 12 bits relative to the largest of
+    each row. An integer of 12 bits takes two letters of base 64, with 2048 added.
+    """
     parts = _parts(values)
     largest = np.maximum(np.abs(parts).reshape(len(values), -1).max(axis=1), 1e-300)
-    scale = (largest / LARGEST).reshape(-1, *(1,) * (parts.ndim - 1))
-    found = {
-        "shape": list(values.shape), "scale": (largest / LARGEST).tolist(),
-        "i2": _text(np.rint(parts / scale).astype("<i2")),
-    }  # fmt: skip
+    steps = largest / (2 ** (bits - 1) - 1)
+    whole = np.rint(parts / steps.reshape(-1, *(1,) * (parts.ndim - 1))).astype("<i2")
+    encoded = {"i2": _text(whole)} if bits == 16 else {"i12": _letters(whole)}
+    found = {"shape": list(values.shape), "scale": steps.tolist()} | encoded
     return found if np.iscomplexobj(values) else found | {"real": True}
 
 
@@ -35,3 +35,11 @@ def _parts(values: np.ndarray) -> np.ndarray:
 
 def _text(values: np.ndarray) -> str:
     return base64.b64encode(values.tobytes()).decode()
+
+
+def _letters(whole: np.ndarray) -> str:
+    """Return integers of 12 bits as two letters of base 64 each."""
+    pairs = np.append(whole.ravel(), 0)[: whole.size + whole.size % 2].astype(np.uint16) + 2048
+    one, other = (pairs.reshape(-1, 2).T).astype(np.uint32)
+    three = np.stack([one >> 4, (one & 15) << 4 | other >> 8, other & 255], axis=1)
+    return base64.b64encode(three.astype(np.uint8).tobytes()).decode()[: 2 * whole.size]
