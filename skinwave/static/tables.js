@@ -12,7 +12,7 @@ const fixed = (value, digits, unit) => (Number.isFinite(value)
 const percent = (share) => fixed(100 * share, share < 0.0995 ? 1 : 0, "%");
 const milliseconds = (seconds) => fixed(1e3 * seconds, 1, "ms");
 const distance = (reach) => (reach ? `${reach.beyond ? "> " : ""}${fixed(1e3 * reach.metre, 0, "mm")}`
-  : "nowhere");
+  : reach === null ? "nowhere" : NONE); // until there are maps
 const subscript = (name) => escaped(name).replace(/_(\w+)/g, "<sub>$1</sub>");
 
 /** The four numbers of an answer as text; level and reach exist on skin only. */
