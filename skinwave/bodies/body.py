@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from meshes import Palm
-from simple_model.choices import choose
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.dispersion import DispersionCurves
 from simple_model.layers.material import NOT_SKIN, PRESETS, Material
@@ -37,6 +36,7 @@ from skinwave.bodies.supports import (
     complete_sides,
 )
 from skinwave.system import extensions
+from skinwave.system.extensions import Registry
 from skinwave.typing import Floats
 
 KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
@@ -352,7 +352,8 @@ def _rayleigh(body: Body, frequency: float) -> float:
     return float(1 / np.real(slowness)) * solid.rayleigh_speed / solid.shear_speed
 
 
-KINDS: dict[str, BodyKind] = {}
+_KINDS = Registry[BodyKind](what="body kind")
+KINDS = _KINDS.records
 BODIES: dict[str, Body] = {}  # presets by name
 
 
@@ -361,7 +362,7 @@ def register(kind: BodyKind) -> BodyKind:
 
     A preset of a known kind needs no registration: `BODIES[name] = Body(...)`.
     """
-    extensions.add(KINDS, kind.name, kind, kind.discretise)
+    extensions.add(_KINDS, kind.name, kind, kind.discretise)
     for name, own in kind.presets.items():
         BODIES[name] = Body(kind=kind.name, **own)
     return kind
@@ -369,9 +370,7 @@ def register(kind: BodyKind) -> BodyKind:
 
 def kind_of(name: str) -> BodyKind:
     """Return the kind with a name; raises a ValueError if it is unknown."""
-    if name not in KINDS:
-        extensions.load()
-    return KINDS[choose("body kind", name, KINDS)]
+    return extensions.find(_KINDS, name)
 
 
 def check_keys(kind: BodyKind, names: Set[str]) -> None:

@@ -1,18 +1,19 @@
-"""Convert a pattern between file formats: scene, AdapTics, CSV, WAV, pyautd3."""
+"""Convert a pattern between file formats: scene, AdapTics, CSV, WAV, pyautd3, or own."""
 
 import argparse
 from math import isfinite
 from pathlib import Path
 
 from skinwave.commands.common import add_reporting, metre, summarise
+from skinwave.system.formats import PATTERN_READERS, PATTERN_WRITERS, suffixes
 from skinwave.system.plain_text import number_in
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     add = parser.add_argument
-    add("source", type=Path, metavar="IN", help="file to read: .toml, .adaptics, .csv or .wav")
-    add("target", type=Path, metavar="OUT", help="file to write: .toml, .adaptics, .csv or .py")
+    add("source", type=Path, metavar="IN", help=f"file to read: {suffixes(PATTERN_READERS)}")
+    add("target", type=Path, metavar="OUT", help=f"file to write: {suffixes(PATTERN_WRITERS)}")
     add("--scene", type=Path, metavar="SCENE", help="scene file that receives the pattern")
     add(
         "--rate", type=float, metavar="HZ", help="samples per second of a CSV file, read or written"

@@ -13,6 +13,7 @@ from skinwave.commands.common import (
     summarise,
     warn,
 )
+from skinwave.system.formats import MEASUREMENTS, suffixes
 
 if TYPE_CHECKING:
     from skinwave.measure import Measurement
@@ -50,7 +51,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=int, default=0, help="seed of the starts (default: 0)")
     add(
         "--inspect", type=Path, metavar="FILE", help="report what a file contains, without a fit: "
-        ".csv .txt .lvm .tdms .npz .wav .mat .uff .f32",
+        f"{suffixes(MEASUREMENTS)}",
     )  # fmt: skip
     add(
         "--false-alarm", type=float, default=0.01, metavar="P",

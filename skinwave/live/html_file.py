@@ -20,6 +20,7 @@ from skinwave.scene.paper15 import tactons
 from skinwave.scene.scene import BODIES, Body, Scene, body_name
 from skinwave.system.effort import Progress, silent
 from skinwave.system.failures import failure_text, or_failed
+from skinwave.system.formats import MEASUREMENTS, suffixes
 from skinwave.system.scripts import bundle, json_for_script
 from skinwave.system.templates import render
 
@@ -35,7 +36,7 @@ def page(data: Mapping[str, Any], title: str = TITLE) -> str:
         "live.html", title=title, script=script, worker=bundle(static, "worker.js"),
         css=(static / "page.css").read_text(encoding="utf-8"),
         data=json_for_script(data), policy=policy(script, served=bool(data.get("api"))),
-        failed=failure_text(data.get("failures", {})),
+        failed=failure_text(data.get("failures", {})), measured=suffixes(MEASUREMENTS),
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from meshes import reading
 from skinwave.measure.headers import Column, parse_heading
-from skinwave.measure.recording import Given, Recording, factors_in
+from skinwave.measure.recording import Given, Reader, Recording, factors_in, register
 from skinwave.measure.table import Table, choose_columns, recording_of
 
 LARGEST = 1_000_000_000  # bytes
@@ -116,3 +116,6 @@ def read_tdms(path: Path, given: Given) -> Recording:
     if not signals:
         raise ValueError("no channel of the TDMS file has numbers; save the signals as numbers")
     return _simultaneous(signals, given)
+
+
+register(Reader(name="TDMS", suffixes=(".tdms",), read=read_tdms, choices=("columns",)))

@@ -1,22 +1,30 @@
-"""Readers of measurements: tables, LabVIEW, .npz, .wav, .mat, UFF 58, and two published sets."""
+"""Measurements in files of any registered format; readers of .wav and of a published set."""
 
 import io
 import re
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from meshes import reading
-from skinwave.measure import arrays, labview, text, universal
+from skinwave.measure import text
 from skinwave.measure.headers import Column
 from skinwave.measure.measurement import Measurement
-from skinwave.measure.recording import FACTOR, Given, Recording, complete, unknown_places
+from skinwave.measure.recording import (
+    FACTOR,
+    Given,
+    Reader,
+    Recording,
+    complete,
+    register,
+    unknown_places,
+)
 from skinwave.measure.table import Table, recording_of
 from skinwave.measure.units import metres
+from skinwave.system import extensions
+from skinwave.system.formats import MEASUREMENTS
 from skinwave.typing import Floats
 
 LARGEST_WAV = 500_000_000  # bytes
@@ -88,27 +96,8 @@ def read_skinsource(path: Path, given: Given) -> Recording:
     )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class Reader:
-    """File format: name, suffixes, reader, and the options that apply to such files."""
-
-    name: str
-    suffixes: tuple[str, ...]
-    read: Callable[[Path, Given], Recording]
-    choices: tuple[str, ...] = ("columns",)
-
-
-READERS = (
-    Reader(name="text", suffixes=(".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm"), read=text.read),
-    Reader(name="TDMS", suffixes=(".tdms",), read=labview.read_tdms),
-    Reader(name="NumPy", suffixes=(".npz",), read=arrays.read_npz,
-           choices=("variable", "direction")),
-    Reader(name="sound", suffixes=(".wav",), read=read_wav),
-    Reader(name="MATLAB", suffixes=(".mat",), read=arrays.read_mat, choices=("variable",)),
-    Reader(name="Universal File Format 58", suffixes=(".uff", ".unv", ".uf", ".58"),
-           read=universal.read, choices=("direction",)),
-    Reader(name="SkinSource", suffixes=(".f32",), read=read_skinsource, choices=()),
-)  # fmt: skip
+register(Reader(name="sound", suffixes=(".wav",), read=read_wav, choices=("columns",)))
+register(Reader(name="SkinSource", suffixes=(".f32",), read=read_skinsource))
 
 
 def read(path: str | Path, **options: Any) -> Measurement:
@@ -116,7 +105,7 @@ def read(path: str | Path, **options: Any) -> Measurement:
 
     Parameters
     ----------
-    path : file with one of the suffixes in `READERS`
+    path : file with the suffix of a registered `Reader`
     **options : fields of `skinwave.measure.recording.Given` that replace what the file says:
         quantity, unit, places, sign, rate, variable, columns, direction
 
@@ -153,11 +142,10 @@ def read_complete(path: str | Path) -> Measurement:
 
 
 def _reader(path: Path) -> Reader:
-    for reader in READERS:
-        if path.suffix.lower() in reader.suffixes:
-            return reader
-    known = ", ".join(suffix for reader in READERS for suffix in reader.suffixes)
-    raise ValueError(f"{path}: unknown format '{path.suffix}'; export CSV, or use one of {known}")
+    try:
+        return extensions.find(MEASUREMENTS, path.suffix.lower())
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
 
 
 def parse_places(words: str) -> Floats:

@@ -20,7 +20,7 @@ import numpy as np
 from meshes.reading import read_exported_text
 from skinwave.measure.headers import TIME, UNITS, Column, X, Y, parse_heading
 from skinwave.measure.labview import read_lvm
-from skinwave.measure.recording import Given, Recording
+from skinwave.measure.recording import Given, Reader, Recording, register
 from skinwave.measure.table import EXAMPLE, Notes, Table, coordinates, recording_of
 from skinwave.measure.units import canonical, quantity_of, split_level
 from skinwave.system.plain_text import number_in
@@ -319,3 +319,11 @@ def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes
     if others and not any(names[k] for k in others):
         notes.append((cells[others[0]].lower(), " ".join(cells[k] for k in others[1:])))
     return values
+
+
+register(
+    Reader(
+        name="text", suffixes=(".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm"), read=read,
+        choices=("columns",),
+    )
+)  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 from meshes import reading
 from skinwave.measure import units
 from skinwave.measure.delays import NOT_SIMULTANEOUS, align_by_references
-from skinwave.measure.recording import Given, Recording, unknown_places
+from skinwave.measure.recording import Given, Reader, Recording, register, unknown_places
 from skinwave.typing import Floats
 
 LARGEST = 1_000_000_000  # bytes
@@ -324,3 +324,11 @@ def _align(
         return moved, drive, [remark]
     turn = np.exp(1j * (np.angle(each[:1, :, :1]) - np.angle(each)))
     return values * turn, each[0, :, 0], ["phases of places are relative to their references"]
+
+
+register(
+    Reader(
+        name="Universal File Format 58", suffixes=(".uff", ".unv", ".uf", ".58"), read=read,
+        choices=("direction",),
+    )
+)  # fmt: skip

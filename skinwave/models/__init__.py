@@ -5,10 +5,10 @@ Importing this package loads no numerical library, because the command line list
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 from skinwave.system import extensions
+from skinwave.system.extensions import Registry
 
 if TYPE_CHECKING:
     from simple_model import Effort, ErrorPart, Response
@@ -138,7 +138,9 @@ class Model:
         return bool(self.from_rest)
 
 
-_MODELS: dict[str, Model] = {}
+MODELS = Registry[Model](
+    what="model", built_in={name: f"{__name__}.{file}" for name, file in BUILT_IN.items()}
+)
 
 
 def register(model: Model) -> Model:
@@ -149,18 +151,16 @@ def register(model: Model) -> Model:
     ValueError
         If the name is taken.
     """
-    if model.name in BUILT_IN and not model.solve.__module__.startswith(f"{__name__}."):
-        raise ValueError(f"'{model.name}' is registered already; choose another name")
     from skinwave.models.options import underflow_to_zero
 
     model = replace(model, solve=underflow_to_zero()(model.solve))
-    extensions.add(_MODELS, model.name, model, model.solve)
+    extensions.add(MODELS, model.name, model, model.solve)
     return model
 
 
 def names() -> tuple[str, ...]:
     """Return the names of all models, the built-in ones first."""
-    return (*BUILT_IN, *(name for name in _MODELS if name not in BUILT_IN))
+    return extensions.names(MODELS)
 
 
 def named(name: str) -> Model:
@@ -171,10 +171,4 @@ def named(name: str) -> Model:
     ValueError
         If the name is unknown.
     """
-    from simple_model.choices import choose
-
-    if name in BUILT_IN:
-        import_module(f"{__name__}.{BUILT_IN[name]}")
-    elif name not in _MODELS:
-        extensions.load()
-    return _MODELS[choose("model", name, names())]
+    return extensions.find(MODELS, name)

@@ -21,13 +21,23 @@ from simple_model import Tacton, Trajectory
 from simple_model.load.tacton import COMMENSURATE, LONGEST, RETURN_TOLERANCE
 from simple_model.load.trajectory import LARGEST_SIZE
 from skinwave.patterns.adaptics_file import Brush, Track, parse
-from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, Pattern, one_height, thin
+from skinwave.patterns.pattern import (
+    ENGINE_RATE,
+    STRAIGHT,
+    Format,
+    Options,
+    Pattern,
+    one_height,
+    register,
+    thin,
+)
+from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
 ENDLESS = 1.0  # s, duration of a pattern without an end
 
 
-def read(content: bytes, options: Options) -> Pattern:
+def read(content: bytes, options: Options, base: Scene) -> Pattern:
     """Read the pattern of an .adaptics file; if it jumps back endlessly, only its loop."""
     animation = parse(content, options.parameters)
     notes = list(animation.notes)
@@ -205,3 +215,6 @@ def _offset(name: str, cycles: Floats, numbers: list[Floats]) -> Floats:
         x, y = x_scale * np.sin(a * u + d), y_scale * np.sin(b * u)
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+register(Format(suffix=".adaptics", read=read))

@@ -8,7 +8,15 @@ import numpy as np
 
 from simple_model import Tacton
 from skinwave.patterns.adaptics_file import DRAWING_FREQUENCY, FORMAT, REVISIONS
-from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, loudness, thin
+from skinwave.patterns.pattern import (
+    ENGINE_RATE,
+    STRAIGHT,
+    Format,
+    Options,
+    loudness,
+    register,
+    thin,
+)
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -134,3 +142,6 @@ def _figure(name: str, numbers: dict[str, float], tacton: Tacton, f_d: float) ->
 
 def _f64(value: float) -> dict[str, Any]:
     return {"type": "f64", "value": float(value)}
+
+
+register(Format(suffix=".adaptics", write=write))

@@ -9,7 +9,7 @@ from math import ceil
 import numpy as np
 
 from simple_model import MovingPressure
-from skinwave.patterns.pattern import Options, aliasing_notes, loudness
+from skinwave.patterns.pattern import Format, Options, aliasing_notes, loudness, register
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -128,3 +128,6 @@ with Controller.open([AUTD3(pos=[0.0, 0.0, 0.0], rot=[1, 0, 0, 0])], Nop()) as a
     time.sleep({scene.tacton.duration!r})
     autd.send(Null())
 '''
+
+
+register(Format(suffix=".py", write=write))

@@ -2,19 +2,20 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from meshes import reading
 from simple_model.numbers import percent
-from skinwave.patterns import adaptics, adaptics_out, autd3, focal_points, waveform
-from skinwave.patterns.pattern import Options, Pattern, onto, resize, wide_enough
+from skinwave.patterns.pattern import Options, onto, resize, wide_enough
 from skinwave.scene import file as scene_file
 from skinwave.scene.scene import Body, Scene, check_load
+from skinwave.system import extensions
+from skinwave.system.extensions import Registry
+from skinwave.system.formats import PATTERN_READERS, PATTERN_WRITERS
 
-READERS = (".toml", ".adaptics", ".csv", ".wav")
-WRITERS = (".toml", ".adaptics", ".csv", ".py")
-LARGEST = {".adaptics": 16_000_000, ".csv": 128_000_000, ".wav": 32_000_000}  # bytes
+SCENE = ".toml"
 
 
 def convert(
@@ -24,7 +25,7 @@ def convert(
 
     Parameters
     ----------
-    source, target : Path, with a suffix of `READERS` and of `WRITERS`
+    source, target : Path, with the suffix of a scene or of a registered `Format`
     options : Options
     base : Scene that receives the pattern: its body, probes and drive; a slab of palm by default
 
@@ -37,9 +38,8 @@ def convert(
     ValueError
         If a file has an unknown suffix or is malformed, or the format cannot express the pattern.
     """
-    if (suffix := target.suffix.lower()) not in WRITERS:
-        raise ValueError(f"{target}: cannot write '{suffix}'; use {', '.join(WRITERS)}")
-    if suffix != ".toml":
+    if (suffix := target.suffix.lower()) != SCENE:
+        _format(PATTERN_WRITERS, target)
         base = replace(base or scene_file.loads(""), body=Body(kind="none"))
     scene, notes = read_pattern(source, options, base)
     content, more = write_pattern(scene, suffix, options)
@@ -53,16 +53,15 @@ def read_pattern(
 
     Without a base, the body is a slab that contains the path. Raises the errors of `convert`.
     """
-    if (suffix := path.suffix.lower()) not in READERS:
-        raise ValueError(f"{path}: cannot read '{suffix}'; use {', '.join(READERS)}")
-    if suffix == ".toml":
+    if path.suffix.lower() == SCENE:
         scene = scene_file.read(path)
         tacton = resize(scene.tacton, options.resize)
         return replace(scene, pressure=replace(scene.pressure, tacton=tacton)), ()
     receiver = base or scene_file.loads("")
-    content = reading.read_bytes(path, LARGEST[suffix])
+    source = _format(PATTERN_READERS, path)
+    content = reading.read_bytes(path, source.largest)
     try:
-        pattern = _read_content(content, suffix, options, receiver)
+        pattern = source.read(content, options, receiver)
         tacton = resize(pattern.tacton, options.resize)
         notes = list(pattern.notes)
         receiver = base or wide_enough(receiver, tacton, notes)
@@ -71,19 +70,20 @@ def read_pattern(
         raise ValueError(f"{path}: {error}") from None
 
 
-def _read_content(content: bytes, suffix: str, options: Options, receiver: Scene) -> Pattern:
-    if suffix == ".wav":
-        return waveform.read(content, options, receiver)
-    return {".adaptics": adaptics, ".csv": focal_points}[suffix].read(content, options)
+def _format(registry: Registry[Any], path: Path) -> Any:
+    try:
+        return extensions.find(registry, path.suffix.lower())
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
 
 
 def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, tuple[str, ...]]:
     """Return a scene in the format of a suffix, and notes; see `convert` for errors."""
-    if suffix == ".toml":
+    if suffix == SCENE:
         return scene_file.dumps(scene).encode(), ()
     check_load(scene, "a pattern of a device")
-    modules = {".adaptics": adaptics_out, ".csv": focal_points, ".py": autd3}
-    content, notes = modules[suffix].write(scene, options)
+    write = extensions.find(PATTERN_WRITERS, suffix).write
+    content, notes = write(scene, options)
     return content, (*notes, *_change_notes(scene, content, suffix))
 
 
@@ -91,8 +91,9 @@ def _change_notes(scene: Scene, content: bytes, suffix: str, most: int = 5000) -
     """Return a note on the change of the load in a file that can be read back, of a CSV by its
     first `most` samples.
     """
-    if suffix not in READERS:
+    if suffix not in extensions.names(PATTERN_READERS):
         return []
+    read = extensions.find(PATTERN_READERS, suffix).read
     is_csv = suffix == ".csv"
     if is_csv:
         rows = 1 + most * len(scene.tacton.foci)
@@ -100,7 +101,7 @@ def _change_notes(scene: Scene, content: bytes, suffix: str, most: int = 5000) -
     changes = []
     for way in ("", " with --hold")[: 1 + is_csv]:
         try:
-            pattern = _read_content(content, suffix, Options(hold=bool(way)), scene)
+            pattern = read(content, Options(hold=bool(way)), scene)
         except ValueError as error:
             return [f"the change of the load is unknown, because it cannot be read back: {error}"]
         change = load_change(scene, onto(scene, pattern, scene.name))

@@ -16,7 +16,15 @@ from meshes import reading
 from simple_model import Tacton, Trajectory, even_phases
 from simple_model.choices import suggestion
 from simple_model.load.tacton import LONGEST, MOST_FOCI
-from skinwave.patterns.pattern import Options, Pattern, aliasing_notes, loudness, one_height
+from skinwave.patterns.pattern import (
+    Format,
+    Options,
+    Pattern,
+    aliasing_notes,
+    loudness,
+    one_height,
+    register,
+)
 from skinwave.scene.scene import Scene
 from skinwave.system.plain_text import csv_table, number_in
 from skinwave.typing import Floats
@@ -33,7 +41,7 @@ MOST_ROWS = 1_000_000
 LARGEST = 1e15  # of numbers in a file: also of timestamps in us
 
 
-def read(content: bytes, options: Options) -> Pattern:
+def read(content: bytes, options: Options, base: Scene) -> Pattern:
     """Read the pattern of a focal-point CSV."""
     rows = _rows(content)
     has_header = number_in(rows[0][1][0]) is None
@@ -206,3 +214,6 @@ def _numbers(line: int, cells: list[str], count: int) -> list[float]:
             f"line {line}, '{','.join(cells)[:60]}', must contain only numbers below {LARGEST:g}"
         )
     return values
+
+
+register(Format(suffix=".csv", read=read, write=write, largest=128_000_000))

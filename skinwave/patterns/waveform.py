@@ -11,7 +11,7 @@ from simple_model import Signal
 from simple_model.choices import choose
 from simple_model.load.rhythm import ROLES
 from simple_model.load.tacton import LONGEST
-from skinwave.patterns.pattern import Options, Pattern
+from skinwave.patterns.pattern import Format, Options, Pattern, register
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -92,3 +92,6 @@ def _scale(samples: Floats, scale: str) -> tuple[Floats, str]:
         )
     note = f"scale '{scale}': full drive is {1 / factor:.4g} of full scale"
     return np.clip(samples * factor, -1, 1), note
+
+
+register(Format(suffix=".wav", read=read, largest=32_000_000))

@@ -1,6 +1,8 @@
-"""Columns of one row of a sweep: its inputs, its results and their cost."""
+"""Columns of one row of a sweep: its inputs, its results, their cost, and registered columns."""
 
-from dataclasses import replace
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +14,39 @@ from skinwave.results.comparison import compare, spread, steady_rms
 from skinwave.results.run import ASSESSED, SUPPORT, Run
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
+from skinwave.system import extensions
+from skinwave.system.extensions import Registry
+from skinwave.system.failures import reason
 
 WEAKEST_LINE = 1e-2  # of the strongest line of the load: weaker ones have no columns
 MOST_LINES = 40  # with columns
 SETTLE = 0.25  # part of a response that is left out of its largest value
 COST = ("dofs", "reduced_dofs", "steps", "solver", "energy_imbalance", "radiated")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """Column of a sweep from outside; "own." precedes its name in the table.
+
+    Parameters
+    ----------
+    name : small letters, digits and "_"; its end gives a unit, such as "_um" or "_m_per_s"
+    value : function of a `Run` that returns a number or, if `per_probe`, one for each probe
+    """
+
+    name: str
+    value: Callable[[Run], Any]
+    per_probe: bool = False
+
+
+COLUMNS = Registry[Column](what="column")
+
+
+def register(column: Column) -> None:
+    """Register a column; raise a ValueError if its name is taken."""
+    if not re.fullmatch("[a-z][a-z0-9_]*", column.name):
+        raise ValueError(f"the column '{column.name}' needs a name of small letters and digits")
+    extensions.add(COLUMNS, column.name, column, column.value)
 
 
 def input_columns(point: DesignPoint) -> dict[str, Any]:
@@ -78,7 +108,24 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
                 row[f"{name}_ratio"] = abs(agreement.scale) * run.lines[name] / pressure
         row |= {f"{name}_{unit}": scale * run.lines[name]} if of_body else {}
         row |= {f"{name}_db": levels[name]} if name in levels else {}
+    extensions.load()
+    for column in COLUMNS.records.values():
+        name = f"own.{column.name}"
+        try:
+            row[name] = _own_value(column, run)
+        except Exception as error:  # whatever a function from outside raises; the rest is kept
+            row[name] = None
+            problem = f"column {name} is missing: {reason(error)}"
+            row["warnings"] = "; ".join(filter(None, (row["warnings"], problem)))
     return plain(row)
+
+
+def _own_value(column: Column, run: Run) -> Any:
+    value = np.asarray(column.value(run), np.float64)
+    shape = (len(run.places),) if column.per_probe else ()
+    if value.shape != shape:
+        raise ValueError(f"its function returns the shape {value.shape}; return {shape}")
+    return value.tolist()
 
 
 def plain(row: dict[str, Any]) -> dict[str, Any]:

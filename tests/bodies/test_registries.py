@@ -44,7 +44,7 @@ def static_deflection():
     """The modules from outside; what they register is gone afterwards, for all other tests."""
     import_module("cylinder")
     yield import_module("static_deflection")
-    del KINDS["cylinder"], BODIES["silicone-cylinder"], models._MODELS["static-deflection"]
+    del KINDS["cylinder"], BODIES["silicone-cylinder"], models.MODELS.records["static-deflection"]
     os.environ.pop(extensions.VARIABLE)
     for name in ("cylinder", "static_deflection"):
         del sys.modules[name]

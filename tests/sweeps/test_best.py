@@ -30,7 +30,7 @@ def parabola():
 
     words = {"name": "parabola", "method": "", "words": ""}
     yield register(Model(**words, solve=solve, is_infinite=True))
-    del models._MODELS["parabola"]
+    del models.MODELS.records["parabola"]
     os.environ.pop(extensions.VARIABLE)  # which processes of other tests would read
 
 
