@@ -26,7 +26,7 @@ COST = ("dofs", "reduced_dofs", "steps", "solver", "energy_imbalance", "radiated
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """Column of a sweep from outside; "own." precedes its name in the table.
+    """Column of a sweep from outside; "own_" precedes its name in the table.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
         row |= {f"{name}_db": levels[name]} if name in levels else {}
     extensions.load()
     for column in COLUMNS.records.values():
-        name = f"own.{column.name}"
+        name = f"own_{column.name}"
         try:
             row[name] = _own_value(column, run)
         except Exception as error:  # whatever a function from outside raises; the rest is kept
