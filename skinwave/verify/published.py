@@ -31,7 +31,9 @@ SPEED = Quantity("phase speed", "m/s")
 LENGTH = Quantity("1/e length", "mm", 1e-3)
 EXPONENT = Quantity("decay exponent", "")
 FOCUS_SPEED = Quantity("speed of the focus", "m/s")
-QUANTITIES = {each.name: each for each in (SPEED, LENGTH, EXPONENT, FOCUS_SPEED)}
+FORCE = Quantity("force at the detection threshold", "mN", 1e-3)
+SOFTEST = Quantity("frequency of least impedance", "Hz")
+QUANTITIES = {each.name: each for each in (SPEED, LENGTH, EXPONENT, FOCUS_SPEED, FORCE, SOFTEST)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,7 @@ class Published:
 
     A frequency is nan for a value without one; a value is nan if only a range is published. `lows`
     and `highs` (n,) span people or a standard deviation; they are empty without a spread. `bodies`
-    of `predictions` are compared with the set.
+    of `predictions` are compared with the set, under contacts of each of the `areas` in m2.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Published:
     how: str
     bodies: tuple[str, ...]
     built: tuple[str, ...] = ()
+    areas: tuple[float, ...] = ()
     remark: str = ""
 
     def between(self, k: int) -> tuple[float, float]:
@@ -90,7 +93,8 @@ def _read_published(table: dict[str, Any]) -> Published:
         numbers = _by_voigt(frequencies, *voigt.values())
     return Published(
         quantity=quantity, frequencies=frequencies, bodies=tuple(table.pop("bodies")),
-        built=tuple(table.pop("fitted", ())), **numbers, **table,
+        built=tuple(table.pop("fitted", ())),
+        areas=tuple(1e-4 * area for area in table.pop("areas_cm2", ())), **numbers, **table,
     )  # fmt: skip
 
 
@@ -111,6 +115,7 @@ _FILE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="ut
 WAVES = tuple(map(_read_published, _FILE["wave"]))  # speeds, 1/e lengths, exponents by frequency
 SKINSOURCE = next(each for each in WAVES if each.name.startswith("SkinSource"))
 OPTIMUM = _read_published(_FILE["optimum"])
+CONTACTS = tuple(map(_read_published, _FILE["contact"]))
 NOT_COMPARED = tuple(tuple(each.values()) for each in _FILE["not_compared"])
 
 

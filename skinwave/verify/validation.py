@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,14 @@ from skinwave.verify import predictions
 from skinwave.verify.predictions import BODIES, Curves, Finger
 from skinwave.verify.published import (
     ALL,
+    CONTACTS,
     EXPONENT,
+    FORCE,
     LENGTH,
     NOT_COMPARED,
     OPTIMUM,
     SKINSOURCE,
+    SOFTEST,
     SPEED,
     WAVES,
     Published,
@@ -33,6 +37,7 @@ from skinwave.verify.published import (
     all_sources,
 )
 
+QUANTITIES = SPEED, LENGTH, EXPONENT, FORCE, SOFTEST  # each with a sentence and a row
 NONE, WITHIN, ABOVE, BELOW = "no wave", "within", "above", "below"
 READING_ERROR = 0.05  # relative, of a value that is read off a published curve
 HAND = "hand, finite elements"
@@ -128,7 +133,9 @@ def validate(
     report("waves", 0.02)
     curves = {name: predictions.leading_wave(body) for name, body in BODIES.items()}
     rows = compare_waves(curves)
-    report("speed of the focus", 0.15)
+    report("contacts", 0.1)
+    rows += compare_contacts()
+    report("speed of the focus", 0.2)
     rows += [row for name in OPTIMUM.bodies for row in compare_optima(name)]
     return curves, rows + of_hand
 
@@ -144,6 +151,20 @@ def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
     sets = (*WAVES, all_sources(SPEED), all_sources(LENGTH))
     return [row for each in sets for name in each.bodies
             for row in compare_set(each, name, ours(each, name))]  # fmt: skip
+
+
+def compare_contacts() -> list[Compared]:
+    """Return rows of the sets of contacts, each for all areas."""
+    rows = []
+    for each in CONTACTS:
+        for area, name in product(each.areas, each.bodies):
+            if each.quantity is FORCE:
+                ours = predictions.threshold_force(BODIES[name], area, each.frequencies)
+            else:
+                ours = np.array([predictions.least_impedance(BODIES[name], area)])
+            of_area = f"{each.name}, {1e4 * area:.2g} cm²"
+            rows += compare_set(replace(each, name=of_area), name, ours)
+    return rows
 
 
 def compare_optima(body: str) -> list[Compared]:
@@ -204,11 +225,11 @@ def _by_quantity(own: Sequence[Compared]) -> list[list[Any]]:
     above with their median factors, and the largest factor between sources at one frequency.
     """
     rows: list[list[Any]] = []
-    for quantity in (SPEED, LENGTH, EXPONENT):
+    for quantity in QUANTITIES:
         alike = [row for row in own if row.published.quantity is quantity]
         below, above = ([r for r in alike if r.outcome == each] for each in (BELOW, ABOVE))
         apart = None
-        if quantity is not EXPONENT:
+        if quantity in (SPEED, LENGTH):
             band = all_sources(quantity)
             ratios = (high / low for low, high in zip(band.lows, band.highs, strict=True))
             apart = significant(max(ratios), 2)
@@ -226,7 +247,7 @@ def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
     own = [row for row in rows if not row.is_built and not row.published.name.startswith(ALL)]
     parts: list[Part] = [
         _picture("factors", _factors, (10.5, 0.24 * len(sources) + 1.2), FACTORS, rows),
-        " ".join([others[0], *others[4:]]), SCOPE,
+        " ".join([others[0], *others[1 + len(QUANTITIES):]]), SCOPE,
         Details("Every set and preset", [_summary(rows)]),
         Details("Every value", [_table(rows)]),
         Section("Speed and decay of waves",

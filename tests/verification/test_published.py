@@ -8,12 +8,23 @@ import numpy as np
 import pytest
 from scipy.special import i0e
 
+from simple_model import sensation_level
+from simple_model.layers.material import Material
 from simple_model.load.focus import spot_width
+from skinwave.bodies import Body
 from skinwave.commands.cli import main
 from skinwave.system.effort import silent
 from skinwave.verify import predictions, validation
 from skinwave.verify.predictions import BODIES, Finger, decay_exponents, focus_speeds, leading_wave
-from skinwave.verify.published import LENGTH, OPTIMUM, SPEED, WAVES, all_sources, rayleigh_wave
+from skinwave.verify.published import (
+    CONTACTS,
+    LENGTH,
+    OPTIMUM,
+    SPEED,
+    WAVES,
+    all_sources,
+    rayleigh_wave,
+)
 from skinwave.verify.validation import ABOVE, BELOW, WITHIN, compare_finger, compare_set
 
 SPREAD = replace(
@@ -107,6 +118,49 @@ def test_best_focus_speed_of_a_half_space_is_near_its_surface_wave():
     assert 2.4 < predictions.peak(predictions.SPEEDS, largest) < 3.3
     assert np.isnan(predictions.peak(np.arange(3.0), np.array([3.0, 2.0, 1.0])))
     assert predictions.peak(np.arange(5.0), -((np.arange(5.0) - 2.3) ** 2)) == pytest.approx(2.3)
+
+
+def elastic(modulus):
+    """A half-space without loss, nearly incompressible."""
+    material = Material(density=1000, shear_modulus=modulus, poisson=0.4999)
+    return Body(kind="slab", material=material, depth=inf)
+
+
+def test_a_disc_deflects_a_half_space_as_in_closed_form():
+    """Mean under a uniform pressure: 16 (1 - nu^2) F / 3 pi^2 E a, and 1.3 % less for the edge."""
+    area, modulus, nu = 1.8e-4, 25e3, 0.4999
+    found = predictions.disc_compliance(elastic(modulus), area, [1e-3])
+    young, radius = 2 * modulus * (1 + nu), np.sqrt(area / np.pi)
+    expected = 16 * (1 - nu**2) / (3 * np.pi**2 * young * radius)
+    assert abs(found[0]) == pytest.approx(0.987 * expected, rel=2e-3)
+
+
+def test_the_frequency_of_least_impedance_is_that_of_the_shear_speed_over_the_radius():
+    """Without loss, the only length is the radius and the only speed that of shear waves."""
+    usual = predictions.least_impedance(elastic(10e3), 1.0e-4)
+    assert 100 < usual < 600
+    assert predictions.least_impedance(elastic(10e3), 4.0e-4) == pytest.approx(usual / 2, rel=0.01)
+    assert predictions.least_impedance(elastic(20e3), 2.0e-4) == pytest.approx(usual, rel=0.01)
+
+
+def test_the_threshold_of_a_force_is_that_of_displacement_over_compliance():
+    """On and off, a force has the amplitude 2/pi at its frequency; 1.45 cm2 is 3 dB above 2.9."""
+    body = BODIES["palm"]
+    per_force = abs(predictions.disc_compliance(body, 1.45e-4, [200.0])[0])
+    amplitude = 2 / np.pi * predictions.threshold_force(body, 1.45e-4, [200.0])[0]
+    level = sensation_level(amplitude * per_force, 200.0, "large_contactor")
+    assert level == pytest.approx(20 * np.log10(2**0.5), abs=1e-6)
+
+
+def test_contacts_are_compared_for_each_area_and_body(monkeypatch):
+    monkeypatch.setattr(predictions, "least_impedance", lambda body, area: 160.0)
+    rows = validation.compare_contacts()
+    assert len(rows) == sum(len(each.areas) * len(each.bodies) for each in CONTACTS) == 20
+    by_set = {row.published.name: row for row in rows}
+    assert by_set["Lundström: thenar, 3.1 cm²"].factor == pytest.approx(2.0)
+    assert by_set["Lundström: fingertip, 0.28 cm²"].factor == pytest.approx(0.8)
+    assert by_set["Dalecki: threshold, 1.8 cm²"].published.values == pytest.approx([0.4e-3])
+    assert not any(row.is_built for row in rows)
 
 
 def test_finger_is_compared_at_its_own_frequencies():
