@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from meshes.reading import read_bytes
-from skinwave.measure import Given, Reader, Recording, register
+from skinwave.measure import Given, Recording
+from skinwave.system.formats import MEASUREMENTS, register
 
 
 def read(path: Path, given: Given) -> Recording:
@@ -25,4 +26,4 @@ def read(path: Path, given: Given) -> Recording:
         raise ValueError(f"the file is no .log4 file ({error!r}); export it again") from None
 
 
-register(Reader(name="logger", suffixes=(".log4",), read=read))
+register(MEASUREMENTS, ".log4", function=read, name="logger")

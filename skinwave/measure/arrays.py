@@ -19,16 +19,10 @@ from skinwave.measure import units, universal
 from skinwave.measure.delays import align_by_references
 from skinwave.measure.headers import NAMES, TIME, parse_heading
 from skinwave.measure.matlab import DAMAGED, read_arrays
-from skinwave.measure.recording import (
-    Given,
-    Reader,
-    Recording,
-    factors_in,
-    register,
-    unknown_places,
-)
+from skinwave.measure.recording import Given, Recording, factors_in, unknown_places
 from skinwave.measure.table import rises
 from skinwave.models import named, names
+from skinwave.system.formats import MEASUREMENTS, register
 from skinwave.typing import Floats
 
 FORMAT = "skinwave measurement 1"
@@ -357,5 +351,5 @@ def _real(values: np.ndarray, name: str) -> np.ndarray:
     return values.astype(np.float64)
 
 
-register(Reader(name="NumPy", suffixes=(".npz",), read=read_npz, choices=("variable", "direction")))
-register(Reader(name="MATLAB", suffixes=(".mat",), read=read_mat, choices=("variable",)))
+register(MEASUREMENTS, ".npz", function=read_npz, name="NumPy", choices=("variable", "direction"))
+register(MEASUREMENTS, ".mat", function=read_mat, name="MATLAB", choices=("variable",))

@@ -10,8 +10,9 @@ import numpy as np
 
 from meshes import reading
 from skinwave.measure.headers import Column, parse_heading
-from skinwave.measure.recording import Given, Reader, Recording, factors_in, register
+from skinwave.measure.recording import Given, Recording, factors_in
 from skinwave.measure.table import Table, choose_columns, recording_of
+from skinwave.system.formats import MEASUREMENTS, register
 
 LARGEST = 1_000_000_000  # bytes
 AXIS_UNITS = {"Time": "s", "Frequency": "Hz"}
@@ -118,4 +119,4 @@ def read_tdms(path: Path, given: Given) -> Recording:
     return _simultaneous(signals, given)
 
 
-register(Reader(name="TDMS", suffixes=(".tdms",), read=read_tdms, choices=("columns",)))
+register(MEASUREMENTS, ".tdms", function=read_tdms, name="TDMS", choices=("columns",))

@@ -12,19 +12,10 @@ from meshes import reading
 from skinwave.measure import text
 from skinwave.measure.headers import Column
 from skinwave.measure.measurement import Measurement
-from skinwave.measure.recording import (
-    FACTOR,
-    Given,
-    Reader,
-    Recording,
-    complete,
-    register,
-    unknown_places,
-)
+from skinwave.measure.recording import FACTOR, Given, Recording, complete, unknown_places
 from skinwave.measure.table import Table, recording_of
 from skinwave.measure.units import metres
-from skinwave.system import extensions
-from skinwave.system.formats import MEASUREMENTS
+from skinwave.system.formats import MEASUREMENTS, format_of, register
 from skinwave.typing import Floats
 
 LARGEST_WAV = 500_000_000  # bytes
@@ -96,8 +87,8 @@ def read_skinsource(path: Path, given: Given) -> Recording:
     )  # fmt: skip
 
 
-register(Reader(name="sound", suffixes=(".wav",), read=read_wav, choices=("columns",)))
-register(Reader(name="SkinSource", suffixes=(".f32",), read=read_skinsource))
+register(MEASUREMENTS, ".wav", function=read_wav, name="sound", choices=("columns",))
+register(MEASUREMENTS, ".f32", function=read_skinsource, name="SkinSource")
 
 
 def read(path: str | Path, **options: Any) -> Measurement:
@@ -105,7 +96,7 @@ def read(path: str | Path, **options: Any) -> Measurement:
 
     Parameters
     ----------
-    path : file with the suffix of a registered `Reader`
+    path : file with a suffix of a registered format
     **options : fields of `skinwave.measure.recording.Given` that replace what the file says:
         quantity, unit, places, sign, rate, variable, columns, direction
 
@@ -116,12 +107,12 @@ def read(path: str | Path, **options: Any) -> Measurement:
         message names the option of `skinwave fit --inspect` that supplies it.
     """
     path, given = Path(path), Given(**options)
-    reader = _reader(path)
+    reader = format_of(MEASUREMENTS, path)
     for option in ("variable", "columns", "direction"):
         if getattr(given, option) and option not in reader.choices:
             raise ValueError(f"{path}: --{option} has no effect on {reader.name} files")
     try:
-        return complete(reader.read(path, given), given, path)
+        return complete(reader.function(path, given), given, path)
     except ValueError as error:
         message = " ".join(str(error).split())
         prefix = "" if message.startswith(str(path)) else f"{path}: "
@@ -139,13 +130,6 @@ def read_complete(path: str | Path) -> Measurement:
             f"{error}; `skinwave fit --inspect {path} --out DIR` takes these options and writes a "
             "complete DIR/measurement.npz"
         ) from None
-
-
-def _reader(path: Path) -> Reader:
-    try:
-        return extensions.find(MEASUREMENTS, path.suffix.lower())
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def parse_places(words: str) -> Floats:

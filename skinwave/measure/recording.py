@@ -1,7 +1,7 @@
 """Completion of a file's recording: SI units, positive into the body, even times, no gaps."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,7 +11,6 @@ from simple_model.choices import choose
 from simple_model.quantities import QUANTITIES
 from skinwave.measure import units
 from skinwave.measure.measurement import UNEVEN, Measurement
-from skinwave.system import formats
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
@@ -83,31 +82,6 @@ class Recording:
     name: str = ""
     factors: Mapping[str, float] = field(default_factory=dict)  # that may not be applied
     remarks: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reader:
-    """File format of measurements.
-
-    Parameters
-    ----------
-    name : in messages
-    suffixes : of its files, such as (".csv",)
-    read : function of a path and the options `Given` that returns a `Recording`; it raises a
-        ValueError if the file is malformed or lacks information
-    choices : those of `variable`, `columns` and `direction` that it takes from the options
-    """
-
-    name: str
-    suffixes: tuple[str, ...]
-    read: Callable[[Path, Given], Recording]
-    choices: tuple[str, ...] = ()
-
-
-def register(reader: Reader) -> None:
-    """Register a reader of measurements; raise a ValueError if a suffix is taken."""
-    for suffix in reader.suffixes:
-        formats.add(formats.MEASUREMENTS, suffix, reader, reader.read)
 
 
 def unknown_places(count: int) -> Floats:

@@ -20,9 +20,10 @@ import numpy as np
 from meshes.reading import read_exported_text
 from skinwave.measure.headers import TIME, UNITS, Column, X, Y, parse_heading
 from skinwave.measure.labview import read_lvm
-from skinwave.measure.recording import Given, Reader, Recording, register
+from skinwave.measure.recording import Given, Recording
 from skinwave.measure.table import EXAMPLE, Notes, Table, coordinates, recording_of
 from skinwave.measure.units import canonical, quantity_of, split_level
+from skinwave.system.formats import MEASUREMENTS, register
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
@@ -321,9 +322,5 @@ def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes
     return values
 
 
-register(
-    Reader(
-        name="text", suffixes=(".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm"), read=read,
-        choices=("columns",),
-    )
-)  # fmt: skip
+register(MEASUREMENTS, ".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", function=read, name="text",
+         choices=("columns",))  # fmt: skip

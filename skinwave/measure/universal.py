@@ -14,7 +14,8 @@ import numpy as np
 from meshes import reading
 from skinwave.measure import units
 from skinwave.measure.delays import NOT_SIMULTANEOUS, align_by_references
-from skinwave.measure.recording import Given, Reader, Recording, register, unknown_places
+from skinwave.measure.recording import Given, Recording, unknown_places
+from skinwave.system.formats import MEASUREMENTS, register
 from skinwave.typing import Floats
 
 LARGEST = 1_000_000_000  # bytes
@@ -326,9 +327,5 @@ def _align(
     return values * turn, each[0, :, 0], ["phases of places are relative to their references"]
 
 
-register(
-    Reader(
-        name="Universal File Format 58", suffixes=(".uff", ".unv", ".uf", ".58"), read=read,
-        choices=("direction",),
-    )
-)  # fmt: skip
+register(MEASUREMENTS, ".uff", ".unv", ".uf", ".58", function=read, choices=("direction",),
+         name="Universal File Format 58")  # fmt: skip

@@ -21,17 +21,9 @@ from simple_model import Tacton, Trajectory
 from simple_model.load.tacton import COMMENSURATE, LONGEST, RETURN_TOLERANCE
 from simple_model.load.trajectory import LARGEST_SIZE
 from skinwave.patterns.adaptics_file import Brush, Track, parse
-from skinwave.patterns.pattern import (
-    ENGINE_RATE,
-    STRAIGHT,
-    Format,
-    Options,
-    Pattern,
-    one_height,
-    register,
-    thin,
-)
+from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, Pattern, one_height, thin
 from skinwave.scene.scene import Scene
+from skinwave.system.formats import PATTERN_READERS, register
 from skinwave.typing import Floats
 
 ENDLESS = 1.0  # s, duration of a pattern without an end
@@ -217,4 +209,4 @@ def _offset(name: str, cycles: Floats, numbers: list[Floats]) -> Floats:
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
-register(Format(suffix=".adaptics", read=read))
+register(PATTERN_READERS, ".adaptics", function=read)

@@ -8,16 +8,9 @@ import numpy as np
 
 from simple_model import Tacton
 from skinwave.patterns.adaptics_file import DRAWING_FREQUENCY, FORMAT, REVISIONS
-from skinwave.patterns.pattern import (
-    ENGINE_RATE,
-    STRAIGHT,
-    Format,
-    Options,
-    loudness,
-    register,
-    thin,
-)
+from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, loudness, thin
 from skinwave.scene.scene import Scene
+from skinwave.system.formats import PATTERN_WRITERS, register
 from skinwave.typing import Floats
 
 MOST_KEYFRAMES = 20_000
@@ -144,4 +137,4 @@ def _f64(value: float) -> dict[str, Any]:
     return {"type": "f64", "value": float(value)}
 
 
-register(Format(suffix=".adaptics", write=write))
+register(PATTERN_WRITERS, ".adaptics", function=write)

@@ -9,8 +9,9 @@ from math import ceil
 import numpy as np
 
 from simple_model import MovingPressure
-from skinwave.patterns.pattern import Format, Options, aliasing_notes, loudness, register
+from skinwave.patterns.pattern import Options, aliasing_notes, loudness
 from skinwave.scene.scene import Scene
+from skinwave.system.formats import PATTERN_WRITERS, register
 from skinwave.typing import Floats
 
 TICK = 40_000.0  # Hz
@@ -130,4 +131,4 @@ with Controller.open([AUTD3(pos=[0.0, 0.0, 0.0], rot=[1, 0, 0, 0])], Nop()) as a
 '''
 
 
-register(Format(suffix=".py", write=write))
+register(PATTERN_WRITERS, ".py", function=write)

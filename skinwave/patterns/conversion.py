@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,8 +11,7 @@ from skinwave.patterns.pattern import Options, onto, resize, wide_enough
 from skinwave.scene import file as scene_file
 from skinwave.scene.scene import Body, Scene, check_load
 from skinwave.system import extensions
-from skinwave.system.extensions import Registry
-from skinwave.system.formats import PATTERN_READERS, PATTERN_WRITERS
+from skinwave.system.formats import PATTERN_READERS, PATTERN_WRITERS, format_of
 
 SCENE = ".toml"
 
@@ -25,7 +23,7 @@ def convert(
 
     Parameters
     ----------
-    source, target : Path, with the suffix of a scene or of a registered `Format`
+    source, target : Path, with the suffix of a scene or of a registered format
     options : Options
     base : Scene that receives the pattern: its body, probes and drive; a slab of palm by default
 
@@ -39,7 +37,7 @@ def convert(
         If a file has an unknown suffix or is malformed, or the format cannot express the pattern.
     """
     if (suffix := target.suffix.lower()) != SCENE:
-        _format(PATTERN_WRITERS, target)
+        format_of(PATTERN_WRITERS, target)
         base = replace(base or scene_file.loads(""), body=Body(kind="none"))
     scene, notes = read_pattern(source, options, base)
     content, more = write_pattern(scene, suffix, options)
@@ -58,21 +56,14 @@ def read_pattern(
         tacton = resize(scene.tacton, options.resize)
         return replace(scene, pressure=replace(scene.pressure, tacton=tacton)), ()
     receiver = base or scene_file.loads("")
-    source = _format(PATTERN_READERS, path)
+    source = format_of(PATTERN_READERS, path)
     content = reading.read_bytes(path, source.largest)
     try:
-        pattern = source.read(content, options, receiver)
+        pattern = source.function(content, options, receiver)
         tacton = resize(pattern.tacton, options.resize)
         notes = list(pattern.notes)
         receiver = base or wide_enough(receiver, tacton, notes)
         return onto(receiver, replace(pattern, tacton=tacton), path.stem), tuple(notes)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
-
-
-def _format(registry: Registry[Any], path: Path) -> Any:
-    try:
-        return extensions.find(registry, path.suffix.lower())
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
@@ -82,8 +73,7 @@ def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, t
     if suffix == SCENE:
         return scene_file.dumps(scene).encode(), ()
     check_load(scene, "a pattern of a device")
-    write = extensions.find(PATTERN_WRITERS, suffix).write
-    content, notes = write(scene, options)
+    content, notes = extensions.find(PATTERN_WRITERS, suffix).function(scene, options)
     return content, (*notes, *_change_notes(scene, content, suffix))
 
 
@@ -93,7 +83,7 @@ def _change_notes(scene: Scene, content: bytes, suffix: str, most: int = 5000) -
     """
     if suffix not in extensions.names(PATTERN_READERS):
         return []
-    read = extensions.find(PATTERN_READERS, suffix).read
+    read = extensions.find(PATTERN_READERS, suffix).function
     is_csv = suffix == ".csv"
     if is_csv:
         rows = 1 + most * len(scene.tacton.foci)

@@ -16,16 +16,9 @@ from meshes import reading
 from simple_model import Tacton, Trajectory, even_phases
 from simple_model.choices import suggestion
 from simple_model.load.tacton import LONGEST, MOST_FOCI
-from skinwave.patterns.pattern import (
-    Format,
-    Options,
-    Pattern,
-    aliasing_notes,
-    loudness,
-    one_height,
-    register,
-)
+from skinwave.patterns.pattern import Options, Pattern, aliasing_notes, loudness, one_height
 from skinwave.scene.scene import Scene
+from skinwave.system.formats import PATTERN_READERS, PATTERN_WRITERS, register
 from skinwave.system.plain_text import csv_table, number_in
 from skinwave.typing import Floats
 
@@ -216,4 +209,5 @@ def _numbers(line: int, cells: list[str], count: int) -> list[float]:
     return values
 
 
-register(Format(suffix=".csv", read=read, write=write, largest=128_000_000))
+register(PATTERN_READERS, ".csv", function=read, largest=128_000_000)
+register(PATTERN_WRITERS, ".csv", function=write)

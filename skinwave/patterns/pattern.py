@@ -1,6 +1,6 @@
 """Contents of a pattern file, and options for reading and writing."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Any
@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from simple_model import MovingPressure, Tacton
 from simple_model.load.tacton import tones
 from skinwave.scene.scene import Scene
-from skinwave.system import formats
 from skinwave.typing import Floats
 
 ENGINE_RATE = 20_000.0  # Hz, of samples in AdapTics
@@ -54,34 +53,6 @@ class Options:
     scale: str = "full"
     parameters: Mapping[str, float] = field(default_factory=dict)
     resize: float = 1.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Format:
-    """Pattern format: how files with a suffix are read, written, or both.
-
-    Parameters
-    ----------
-    suffix : such as ".csv"
-    read : function of content, options and the scene that receives the pattern; returns a `Pattern`
-    write : function of a scene and options; returns the content, and notes on approximations
-    largest : bytes of a file that is read
-
-    Functions raise a ValueError if a file is malformed, or if the format cannot express a scene.
-    """
-
-    suffix: str
-    read: Callable[[bytes, Options, Scene], Pattern] | None = None
-    write: Callable[[Scene, Options], tuple[bytes, tuple[str, ...]]] | None = None
-    largest: int = 16_000_000
-
-
-def register(each: Format) -> None:
-    """Register a pattern format; raise a ValueError if its suffix is taken."""
-    ways = (formats.PATTERN_READERS, each.read), (formats.PATTERN_WRITERS, each.write)
-    for registry, function in ways:
-        if function:
-            formats.add(registry, each.suffix, each, function)
 
 
 def onto(base: Scene, pattern: Pattern, name: str) -> Scene:

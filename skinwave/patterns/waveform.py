@@ -11,8 +11,9 @@ from simple_model import Signal
 from simple_model.choices import choose
 from simple_model.load.rhythm import ROLES
 from simple_model.load.tacton import LONGEST
-from skinwave.patterns.pattern import Format, Options, Pattern, register
+from skinwave.patterns.pattern import Options, Pattern
 from skinwave.scene.scene import Scene
+from skinwave.system.formats import PATTERN_READERS, register
 from skinwave.typing import Floats
 
 SCALES = ("full", "peak", "rms")
@@ -94,4 +95,4 @@ def _scale(samples: Floats, scale: str) -> tuple[Floats, str]:
     return np.clip(samples * factor, -1, 1), note
 
 
-register(Format(suffix=".wav", read=read, largest=32_000_000))
+register(PATTERN_READERS, ".wav", function=read, largest=32_000_000)

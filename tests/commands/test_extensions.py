@@ -12,11 +12,7 @@ import pytest
 
 from skinwave.commands.cli import main
 from skinwave.live.html_file import page
-from skinwave.measure import Reader
-from skinwave.measure import register as register_reader
 from skinwave.measure.reading import read
-from skinwave.patterns import Format
-from skinwave.patterns import register as register_format
 from skinwave.scene import file as scene_file
 from skinwave.sweeps import dataset, measures
 from skinwave.system import extensions, formats
@@ -70,7 +66,7 @@ def here(tmp_path, monkeypatch):
 
 def test_examples_are_short():
     for name in NAMES:
-        assert len((FOLDER / f"{name}.py").read_text("utf-8").splitlines()) <= 30
+        assert len((FOLDER / f"{name}.py").read_text("utf-8").splitlines()) <= 33
 
 
 def test_a_measurement_of_an_own_format_is_read_in_si_and_into_the_body(here):
@@ -125,20 +121,18 @@ def test_each_listed_suffix_is_registered_by_its_own_module(registry):
     """As what is listed without importing the modules must be what they register."""
     for suffix, module in registry.built_in.items():
         if suffix != ".toml":
-            record = extensions.find(registry, suffix)
-            function = record.write if registry is formats.PATTERN_WRITERS else record.read
-            assert function.__module__ == module
+            assert extensions.find(registry, suffix).function.__module__ == module
     assert {*registry.records} - {".log4", ".stroke"} == {*registry.built_in} - {".toml"}
 
 
 def test_names_that_are_taken_or_never_found_are_refused(examples):
     logger, stroke, crest = examples
     with pytest.raises(ValueError, match=r"'\.csv' is registered already"):
-        register_reader(Reader(name="own", suffixes=(".csv",), read=logger.read))
+        formats.register(formats.MEASUREMENTS, ".csv", function=logger.read)
     with pytest.raises(ValueError, match=r"'\.wav' is registered already"):
-        register_format(Format(suffix=".wav", read=stroke.read))
+        formats.register(formats.PATTERN_READERS, ".wav", function=stroke.read)
     with pytest.raises(ValueError, match=r"suffix '\.LOG' is not like '\.csv'"):
-        register_reader(Reader(name="own", suffixes=(".LOG",), read=logger.read))
+        formats.register(formats.MEASUREMENTS, ".LOG", function=logger.read)
     with pytest.raises(ValueError, match="'mean_part' is registered already"):
         measures.register(measures.Column(name="mean_part", value=crest.mean_part))
     with pytest.raises(ValueError, match=r"'a\.b' needs a name of small letters"):
