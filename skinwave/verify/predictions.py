@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from math import inf
 from pathlib import Path
 
@@ -116,6 +117,7 @@ def threshold_force(body: Body, area: float, frequencies: ArrayLike) -> Floats:
     return np.pi / 2 * felt / np.abs(disc_compliance(body, area, f))
 
 
+@cache
 def least_impedance(body: Body, area: float) -> float:
     """Return the frequency in Hz at which a force on a disc moves the surface fastest."""
     f = GRID[1::2]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any
@@ -16,10 +15,10 @@ from matplotlib.lines import Line2D
 from simple_model.numbers import EN_DASH, interval, significant
 from skinwave.report.figures import REPORT, png
 from skinwave.system.document import Details, Part, Picture, Report, Section, contents
-from skinwave.system.effort import Progress
+from skinwave.system.effort import Progress, silent
 from skinwave.system.table import Column, Table
 from skinwave.verify import predictions
-from skinwave.verify.predictions import BODIES, Curves, Finger
+from skinwave.verify.predictions import BODIES, Curves, Finger, peak
 from skinwave.verify.published import (
     ALL,
     CONTACTS,
@@ -132,51 +131,44 @@ def validate(
     of_hand = compare_finger(predictions.along_finger(hand, report)) if hand else []
     report("waves", 0.02)
     curves = {name: predictions.leading_wave(body) for name, body in BODIES.items()}
-    rows = compare_waves(curves)
-    report("contacts", 0.1)
-    rows += compare_contacts()
-    report("speed of the focus", 0.2)
-    rows += [row for name in OPTIMUM.bodies for row in compare_optima(name)]
-    return curves, rows + of_hand
+    sets = (*WAVES, all_sources(SPEED), all_sources(LENGTH), *CONTACTS, OPTIMUM)
+    return curves, compare_sets(sets, curves, report) + of_hand
 
 
-def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
-    """Return rows of all published sets of waves for the curves of `BODIES`."""
-
-    def ours(published: Published, name: str) -> Any:
-        if published.quantity is EXPONENT:
-            return predictions.decay_exponents(BODIES[name], published.frequencies)
-        return curves[name].at(published.quantity, published.frequencies)
-
-    sets = (*WAVES, all_sources(SPEED), all_sources(LENGTH))
-    return [row for each in sets for name in each.bodies
-            for row in compare_set(each, name, ours(each, name))]  # fmt: skip
-
-
-def compare_contacts() -> list[Compared]:
-    """Return rows of the sets of contacts, each for all areas."""
+def compare_sets(
+    sets: Sequence[Published], curves: Mapping[str, Curves], report: Progress = silent
+) -> list[Compared]:
+    """Return rows of published sets for their bodies, some with several contacts or paths."""
     rows = []
-    for each in CONTACTS:
-        for area, name in product(each.areas, each.bodies):
-            if each.quantity is FORCE:
-                ours = predictions.threshold_force(BODIES[name], area, each.frequencies)
-            else:
-                ours = np.array([predictions.least_impedance(BODIES[name], area)])
-            of_area = f"{each.name}, {1e4 * area:.2g} cm²"
-            rows += compare_set(replace(each, name=of_area), name, ours)
+    for k, each in enumerate(sets):
+        report(each.quantity.name, 0.1 + 0.9 * k / len(sets))
+        for name in each.bodies:
+            for under, ours in _predicted(each, name, curves).items():
+                rows += compare_set(replace(each, name=each.name + under), name, ours)
     return rows
 
 
-def compare_optima(body: str) -> list[Compared]:
-    """Return rows of the focus speed of the largest deflection of a body, on two circles."""
-    rows = []
-    for perimeter in predictions.PERIMETERS:
-        deflections = predictions.focus_speeds(BODIES[body], perimeter)
-        for what, deflection in zip(("largest", "peak to peak"), deflections, strict=True):
-            name = f"{OPTIMUM.name}, {what}, {1e3 * perimeter:g} mm around"
-            speed = predictions.peak(predictions.SPEEDS, deflection)
-            rows += compare_set(replace(OPTIMUM, name=name), body, [speed])
-    return rows
+def _predicted(
+    each: Published, name: str, curves: Mapping[str, Curves]
+) -> Mapping[str, Iterable[float]]:
+    """Return the predictions (n,) of a body at the frequencies of a set by contact or path."""
+    body, f = BODIES[name], each.frequencies
+    contacts = {f", {1e4 * area:.2g} cm²": area for area in each.areas}
+    if each.quantity is EXPONENT:
+        return {"": predictions.decay_exponents(body, f)}
+    if each.quantity is FORCE:
+        return {of: predictions.threshold_force(body, area, f) for of, area in contacts.items()}
+    if each.quantity is SOFTEST:
+        return {of: [predictions.least_impedance(body, area)] for of, area in contacts.items()}
+    if each is OPTIMUM:
+        return {
+            f", {what}, {1e3 * perimeter:g} mm around": [peak(predictions.SPEEDS, deflection)]
+            for perimeter in predictions.PERIMETERS
+            for what, deflection in zip(
+                ("largest", "peak to peak"), predictions.focus_speeds(body, perimeter), strict=True
+            )
+        }
+    return {"": curves[name].at(each.quantity, f)}
 
 
 def compare_finger(finger: Finger) -> list[Compared]:

@@ -99,7 +99,7 @@ def test_all_sources_span_the_single_sources():
 
 
 def test_each_published_set_has_a_row_for_each_body(curves):
-    rows = validation.compare_waves(curves)
+    rows = validation.compare_sets(WAVES, curves)
     for each in WAVES:
         assert each.source
         assert set(each.built) <= set(BODIES)
@@ -154,7 +154,7 @@ def test_the_threshold_of_a_force_is_that_of_displacement_over_compliance():
 
 def test_contacts_are_compared_for_each_area_and_body(monkeypatch):
     monkeypatch.setattr(predictions, "least_impedance", lambda body, area: 160.0)
-    rows = validation.compare_contacts()
+    rows = validation.compare_sets(CONTACTS, {})
     assert len(rows) == sum(len(each.areas) * len(each.bodies) for each in CONTACTS) == 20
     by_set = {row.published.name: row for row in rows}
     assert by_set["Lundström: thenar, 3.1 cm²"].factor == pytest.approx(2.0)
