@@ -1,8 +1,6 @@
 """Measurements in files of any registered format; readers of .wav and of a published set."""
 
-import io
 import re
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -28,25 +26,10 @@ _SKINSOURCE_NAME = re.compile(r"model-([1-4])-location-(0[1-9]|1\d|20)\.f32", re
 
 def read_wav(path: Path, given: Given) -> Recording:
     """Return the channels of a WAV, one per place; integer samples are fractions of full scale."""
-    from scipy.io import wavfile
+    from skinwave.patterns.waveform import decode  # slow to import
 
     content = reading.read_bytes(path, LARGEST_WAV)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of other chunks
-            rate, data = wavfile.read(io.BytesIO(content))
-    except Exception as error:  # whatever the library raises for damaged bytes
-        unknown = re.match(r"Unknown wave file format: (\w+)", str(error))
-        problem = f"the WAV file is coded as {unknown[1]}" if unknown else (
-            "the file is damaged or not a WAV file")  # fmt: skip
-        raise ValueError(f"{problem}; export it again as PCM") from None
-    if len(data) < 2:
-        raise ValueError(f"the WAV file has {len(data)} samples; give two or more")
-    middle, full = {"u": (128, 128), "f": (0, 1)}.get(
-        data.dtype.kind, (0, 2.0 ** (8 * data.dtype.itemsize - 1))
-    )  # 24 bits are the upper ones of 32
-    with np.errstate(invalid="ignore"):  # nan is refused later
-        values = (data.reshape(len(data), -1).astype(np.float64) - middle) / full
+    rate, values, full = decode(content)
     columns = tuple(Column(text=f"channel {k + 1}", role="") for k in range(values.shape[1]))
     notes = [("rate", repr(float(rate)))]
     if full > 1:

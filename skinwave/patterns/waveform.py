@@ -1,6 +1,7 @@
 """WAV files as the modulation or the envelope of a Tacton."""
 
 import io
+import re
 import warnings
 from dataclasses import replace
 
@@ -28,7 +29,12 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
     """
     choose("role of a WAV", options.role, ROLES)
     choose("scale", options.scale, SCALES)
-    rate, samples = _decode(content)
+    rate, channels, _ = decode(content)
+    if channels.shape[1] != 1:
+        raise ValueError(f"the WAV has {channels.shape[1]} channels; mix it down to one")
+    samples = channels[:, 0]
+    if not np.isfinite(samples).all():
+        raise ValueError("the WAV has samples that are not finite; export it again")
     samples, note = _scale(samples, options.scale)
     if options.role == "envelope":
         if samples.min() < -RESOLUTION:
@@ -53,25 +59,23 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
     )
 
 
-def _decode(content: bytes) -> tuple[int, Floats]:
-    """Return the rate in Hz, and samples (k,) with full scale 1."""
+def decode(content: bytes) -> tuple[int, Floats, float]:
+    """Return the rate in Hz, samples (k, channels) relative to full scale, and full scale."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", wavfile.WavFileWarning)  # about other chunks
             rate, data = wavfile.read(io.BytesIO(content))
-    except Exception:
-        raise ValueError("the file is not a readable WAV; save it as 16-bit PCM") from None
-    if data.ndim != 1:
-        raise ValueError(f"the WAV has {data.shape[1]} channels; mix it down to one")
+    except Exception as error:  # whatever the library raises for damaged bytes
+        unknown = re.match(r"Unknown wave file format: (\w+)", str(error))
+        problem = f"is coded as {unknown[1]}" if unknown else "is damaged or not a WAV file"
+        raise ValueError(f"the file {problem}; export it again as PCM") from None
     if rate <= 0 or len(data) < 2:
         raise ValueError(f"the WAV has {len(data)} samples at {rate} Hz; it needs two or more")
-    if data.dtype == np.uint8:
-        return rate, (data.astype(np.float64) - 128) / 128
-    if data.dtype.kind == "i":
-        return rate, data / float(2 ** (8 * data.dtype.itemsize - 1))
-    if not np.isfinite(data).all():
-        raise ValueError("the WAV has samples that are not finite; export it again")
-    return rate, data.astype(np.float64)
+    middle, full = {"u": (128, 128.0), "f": (0, 1.0)}.get(
+        data.dtype.kind, (0, 2.0 ** (8 * data.dtype.itemsize - 1))
+    )  # 24 bits are the upper ones of 32
+    with np.errstate(invalid="ignore"):  # of samples that are not finite
+        return rate, (data.reshape(len(data), -1).astype(np.float64) - middle) / full, full
 
 
 def _scale(samples: Floats, scale: str) -> tuple[Floats, str]:

@@ -125,6 +125,11 @@ def test_each_listed_suffix_is_registered_by_its_own_module(registry):
     assert {*registry.records} - {".log4", ".stroke"} == {*registry.built_in} - {".toml"}
 
 
+def test_the_documentation_names_each_suffix_of_a_measurement():
+    page = (ROOT / "docs/measurements.md").read_text("utf-8")
+    assert [suffix for suffix in formats.MEASUREMENTS.built_in if f"`{suffix}`" not in page] == []
+
+
 def test_names_that_are_taken_or_never_found_are_refused(examples):
     logger, stroke, crest = examples
     with pytest.raises(ValueError, match=r"'\.csv' is registered already"):
