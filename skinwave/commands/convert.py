@@ -1,4 +1,4 @@
-"""Convert a pattern between file formats: scene, AdapTics, CSV, WAV, pyautd3, or own."""
+"""Convert a pattern between file formats: scene, AdapTics, CSV, WAV, pyautd3."""
 
 import argparse
 from math import isfinite
