@@ -39,8 +39,6 @@ from simple_model.layers.material import Material
 
 OF_AIR = ("fluid", *RESISTANCES)
 KINDS = ("stiffness", "mass", "dashpots", "layer", "springs", *OF_AIR)  # of terms
-NEGLIGIBLE = 1e-30  # modulus and density of a material that is left out, relative to the others
-RESIDUAL = 1e-8  # relative, of GMRES; a resonance amplifies it about a hundred times
 RESTART, CYCLES = 60, 5  # of GMRES
 
 Terms = tuple[tuple[str, int], ...]
@@ -252,10 +250,11 @@ def _solve_with_air(
 
     n = len(force)
     system = LinearOperator((n, n), matvec=preconditioned, dtype=np.complex128)
-    u, failed = gmres(system, solve(force), rtol=RESIDUAL, restart=RESTART, maxiter=CYCLES)
+    residual = 1e-8  # relative, of GMRES; a resonance amplifies it about a hundred times
+    u, failed = gmres(system, solve(force), rtol=residual, restart=RESTART, maxiter=CYCLES)
     if failed:
         raise Diverged(
-            f"GMRES did not reach a residual of {RESIDUAL:g} in {RESTART * CYCLES} iterations for "
+            f"GMRES did not reach a residual of {residual:g} in {RESTART * CYCLES} iterations for "
             "a sheet in air; use a smaller sheet or larger elements, or air = false"
         )
     return np.asarray(u, np.complex128)
@@ -263,7 +262,8 @@ def _solve_with_air(
 
 def _only(materials: Sequence[Material], r: int) -> tuple[Material, ...]:
     """Return elastic materials: modulus and density are 1 for material r, negligible for others."""
-    size = [1.0 if k == r else NEGLIGIBLE for k in range(len(materials))]
+    negligible = 1e-30  # modulus and density of a material that is left out, relative to the others
+    size = [1.0 if k == r else negligible for k in range(len(materials))]
     return tuple(
         Material(density=x, shear_modulus=x, poisson=m.poisson)
         for m, x in zip(materials, size, strict=True)

@@ -32,11 +32,7 @@ from simple_model.load.focus import SPEED_OF_SOUND as C
 from simple_model.plates.air import edge_functions, open_air
 
 FLAT = np.eye(3)[:2]
-GRID_TOLERANCE = 1e-6  # of a spacing, between a node and its place on the grid
-FINEST = 350.0  # rad/m, of the pressure in open air
-SPARE = 6  # functions of this pressure on the sheet more than the wavenumber requires
 RESISTANCES = {"friction": 0.5, "monopole": 2.0, "dipole": 4.0}  # powers of angular frequency
-HIGHEST = 2 * np.pi * 1000.0  # rad/s: resistances grow no further, as sound of short waves does not
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,6 +91,8 @@ def air_around(
         for spacing, count, image in zip((dx, dy), shape[::-1], images, strict=True)
     )
     whole = 2.0 ** sum(images)  # times an integral over the meshed part
+    finest = 350.0  # rad/m, of the pressure in open air
+    spare = 6  # functions of this pressure on the sheet more than the wavenumber requires
     if frame == np.inf:
         pressure = _pressure_in_baffle(shape, (dy, dx), images[::-1], density)
         moments = {"monopole": [np.ones((len(y), len(x)))], "dipole": []}
@@ -108,7 +106,7 @@ def air_around(
         ]
         orders = [
             np.arange(
-                0, int(np.ceil(FINEST * size / 2 + SPARE * size / (size - 2 * frame))), 1 + image
+                0, int(np.ceil(finest * size / 2 + spare * size / (size - 2 * frame))), 1 + image
             )
             for size, image in zip(sizes, images, strict=True)
         ]
@@ -159,7 +157,9 @@ def damping(K: Floats, M: Floats, resistances: Mapping[str, Floats]) -> Floats:
 
 def growth(name: str, omega: Floats) -> Floats:
     """Return the factor (...) of a resistance at angular frequencies (...) in rad/s."""
-    return np.asarray(np.minimum(omega, HIGHEST) ** RESISTANCES[name])
+    # rad/s: resistances grow no further, as sound of short waves does not.
+    highest = 2 * np.pi * 1000.0
+    return np.asarray(np.minimum(omega, highest) ** RESISTANCES[name])
 
 
 def _pressure_in_baffle(
@@ -220,9 +220,10 @@ def inverse_distance(x: Floats, y: Floats, size: tuple[float, float]) -> Floats:
 def _grid_lines(x: Floats) -> tuple[Ints, float]:
     """Return the number (n,) of the grid line at each coordinate (n,), and the line spacing."""
     gaps = np.diff(np.sort(x))
-    step = gaps[gaps > GRID_TOLERANCE * np.ptp(x)].min()
+    grid_tolerance = 1e-6  # of a spacing, between a node and its place on the grid
+    step = gaps[gaps > grid_tolerance * np.ptp(x)].min()
     index = np.rint((x - x.min()) / step).astype(np.int64)
     step = float(np.ptp(x) / index.max())
-    if np.abs(x - x.min() - step * index).max() > GRID_TOLERANCE * step:
+    if np.abs(x - x.min() - step * index).max() > grid_tolerance * step:
         raise MeshError("air around a sheet needs nodes on a regular grid")
     return index, step

@@ -54,9 +54,6 @@ from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
 from simple_model.layers.material import Material
 
-LOCKING_FREE = 9.001  # lam / mu just beyond nu = 0.45: 10-node tetrahedra do not lock up to it
-UNPROJECTED = 2.0  # lam / mu of the unprojected part beyond it: 1 to 3 give the least error
-
 Materials = Material | Mapping[int, Material]
 Fixed = str | Mapping[str, str] | ArrayLike
 # K as a function of shares (r,) of the materials' moduli, and M of their densities (r,).
@@ -265,7 +262,9 @@ def _volume(
 
 def direct_part(lam: Floats, mu: Floats) -> Floats:
     """Return the part (r,) of lam in Pa that acts on the dilatation itself, not its projection."""
-    return np.where(lam > LOCKING_FREE * mu, UNPROJECTED * mu, lam)
+    locking_free = 9.001  # lam / mu just beyond nu = 0.45: 10-node tetrahedra do not lock up to it
+    unprojected = 2.0  # lam / mu of the unprojected part beyond it: 1 to 3 give the least error
+    return np.where(lam > locking_free * mu, unprojected * mu, lam)
 
 
 def elements_of(mesh: TetMesh, chosen: Bools | Ints) -> TetMesh:

@@ -16,8 +16,6 @@ from meshes import MeshError, TetMesh, facet_set
 from meshes.tetmesh import FACES, facet_keys
 from simple_model.layers.material import Material
 
-ABSORBED_RATIO = 11.0  # (c_p / c_s)**2 at nu = 0.45; stiffer dashpots would pin normal motion
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
@@ -77,8 +75,9 @@ def dashpots(
         nodes, share = _nonzero_facets(nodes, share)
     m = [materials[r] for r in region[owners(mesh, nodes)]]
     shear = np.array([x.density * x.shear_speed for x in m])
+    absorbed_ratio = 11.0  # (c_p / c_s)**2 at nu = 0.45; stiffer dashpots would pin normal motion
     squared_ratio = np.array(
-        [min((x.pressure_speed / x.shear_speed) ** 2, ABSORBED_RATIO) for x in m]
+        [min((x.pressure_speed / x.shear_speed) ** 2, absorbed_ratio) for x in m]
     )
     pressure = shear * np.sqrt(squared_ratio)
     unit = facet_normals(mesh, nodes).reshape(len(nodes), -1, 3)

@@ -22,9 +22,6 @@ from fem.maxwell import Branch, MaxwellBranch, maxwell_only
 from fem.transient import State
 from fem.typing import Complex, Floats
 
-ROUND_OFF = 1e-6  # of the reactive power
-TINY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps  # smaller numbers lose digits
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Relaxing:
@@ -160,8 +157,10 @@ def imbalance(spent: EnergyBalance, stored: float = 0.0) -> float:
     `stored` is the energy in J that the body has gained. Round-off, of tiny numbers or of the
     reactive power, is ignored.
     """
-    size = max(abs(spent.work), abs(stored) + spent.lost, ROUND_OFF * spent.exchanged)
-    return abs(spent.work - stored - spent.lost) / size if size > TINY else 0.0
+    round_off = 1e-6  # of the reactive power
+    size = max(abs(spent.work), abs(stored) + spent.lost, round_off * spent.exchanged)
+    tiny = np.finfo(np.float64).tiny / np.finfo(np.float64).eps  # smaller numbers lose digits
+    return abs(spent.work - stored - spent.lost) / size if size > tiny else 0.0
 
 
 def mean_power(

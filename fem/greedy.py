@@ -33,17 +33,9 @@ from fem.affine_model import (
 from fem.krylov import reduce
 from fem.typing import Array, Complex, Floats, Ints
 
-LOSS_FREQUENCY = 2 * np.pi * 200.0  # rad/s, where losses are compared
-NESTED = 3 / 4  # of the vectors: the smaller basis, from which the change is computed
-CHECKED = 2  # materials solved on the full body, at one line each
 MOST_BASES = 6
-WATCHED_LINES = 16  # strongest lines, whose changes are compared
-SHARE_TOLERANCE = 1e-9  # of a share of a geometry
 DEPENDENT = 1e-10  # remainder of a direction outside a basis, or its square, that is round-off
-IN_A_ROW = 3  # predictions within the tolerance that end the search
 MOST_STATES = 80  # of one line
-EXPECTED_STATES = 25  # of one line, for the progress
-SETTLED = 0.1  # of the tolerance: lines with less error need no further state
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,7 +66,8 @@ class Variant:
     @property
     def is_between(self) -> bool:
         """Whether its geometry is interpolated, not one of the g geometries."""
-        return float(self.shares.max()) < 1 - SHARE_TOLERANCE
+        share_tolerance = 1e-9  # of a share of a geometry
+        return float(self.shares.max()) < 1 - share_tolerance
 
 
 def reduce_affine(
@@ -100,6 +93,7 @@ def reduce_affine(
     basis, visited, checked = np.zeros((len(first.affine.free), 0)), set[int](), 0
     parts = np.zeros((len(geometries), len(first.affine.parts), 0, 0))
     errors: dict[int, float] = {}
+    nested = 3 / 4  # of the vectors: the smaller basis, from which the change is computed
     for step in range(min(MOST_BASES, len(training))):
         visited.add(t)
         full = training[t].geometry()
@@ -108,7 +102,7 @@ def reduce_affine(
             tolerance / 2, loads=full.loads, air=full.affine.air, solver=solver,
             progress=lambda x: progress((step + x) / (step + 2)),  # noqa: B023
         )  # fmt: skip
-        smaller = basis.shape[1] or int(NESTED * reduced.basis.shape[1])
+        smaller = basis.shape[1] or int(nested * reduced.basis.shape[1])
         basis = _join(basis, reduced.basis[full.affine.free], M)
         model = _project(geometries, basis, parts)
         parts = model.parts
@@ -169,7 +163,8 @@ def _suspects(
 
     everywhere = np.flatnonzero(frequencies > 0)
     strength = np.linalg.norm(lines(others[0], everywhere), axis=1)
-    watched = everywhere[np.argsort(-strength)[:WATCHED_LINES]]
+    watched_lines = 16  # strongest lines, whose changes are compared
+    watched = everywhere[np.argsort(-strength)[:watched_lines]]
     changes = []
     for t in others:
         now = lines(t, watched)
@@ -179,10 +174,11 @@ def _suspects(
         changes.append((float(change[k]), (t, int(watched[k]), now[k], least)))
     changes.sort(key=lambda each: -each[0])
     visited = set[tuple[float, ...]]()
+    checked = 2  # materials solved on the full body, at one line each
     for rank, (_, suspect) in enumerate(changes):
         variant = training[suspect[0]]
         geometry = tuple(variant.shares.round(6).tolist())
-        if rank < CHECKED or variant.is_between or geometry not in visited:
+        if rank < checked or variant.is_between or geometry not in visited:
             yield suspect
         visited.add(geometry)
 
@@ -227,7 +223,8 @@ def _join(basis: Floats, more: Floats, M: LinearOperator) -> Floats:
 
 def _loss(solids: Solids) -> float:
     """Return the sum of the loss tangents of all materials."""
-    moduli = np.array([m.complex_modulus(LOSS_FREQUENCY) for m in solids.materials])
+    loss_frequency = 2 * np.pi * 200.0  # rad/s, where losses are compared
+    moduli = np.array([m.complex_modulus(loss_frequency) for m in solids.materials])
     return float((moduli.imag / moduli.real).sum())
 
 
@@ -253,16 +250,19 @@ def line_bases(
     bases, errors = [_of_line(model, k, nothing) for k in lines], []
     before = np.zeros((len(weights), len(bases), model.outputs.shape[1]), complex)
     changes, left = np.zeros(len(weights)), np.ones(len(weights), bool)
+    in_a_row = 3  # predictions within the tolerance that end the search
+    expected_states = 25  # of one line, for the progress
+    settled = 0.1  # of the tolerance: lines with less error need no further state
     for _ in range(min(MOST_STATES, len(weights))):
         t = int(np.argmax(np.where(left, changes, -1)))
         left[t] = False
         exact = steady_states(model, weights[t], shares[t], lines)
         by_line = line_errors(before[t], exact @ np.tensordot(shares[t], model.outputs, 1).T)
         errors.append(float(by_line.max()))
-        if len(errors) > IN_A_ROW and max(errors[-IN_A_ROW:]) <= tolerance:
-            return tuple(bases), max(errors[-IN_A_ROW:])
-        progress(min(0.9, len(errors) / EXPECTED_STATES))
-        for k in np.flatnonzero(by_line > SETTLED * tolerance).tolist():
+        if len(errors) > in_a_row and max(errors[-in_a_row:]) <= tolerance:
+            return tuple(bases), max(errors[-in_a_row:])
+        progress(min(0.9, len(errors) / expected_states))
+        for k in np.flatnonzero(by_line > settled * tolerance).tolist():
             bases[k] = _extend(bases[k], exact[k], model, k)
         now = np.stack(
             [_outputs_of_all(b, weights[:, k], shares) for k, b in enumerate(bases)], axis=1

@@ -39,25 +39,8 @@ from fem.reduced import ReducedModel
 from fem.typing import Complex, Floats
 
 EXPANSION_POINT = 2 * np.pi * 200.0  # rad/s: about 4.5 times the lowest natural frequency is best
-# Expansion point over the band with Maxwell branches, where waves of high frequency lose little and
-# many of them matter. Best between 0.8 and 1.6; the point above needs nearly twice as many moments.
-RELAXING_POINT = 1.0
-# Moments between two error estimates: at least this many, which give the error to a factor of 4,
-# and this share of all, because estimating the error of a large model costs more than its moments.
-FEWEST_BETWEEN = 3
-SHARE_BETWEEN = 1 / 16
 MOST_MOMENTS = 200
-FREQUENCIES, COARSE_STEP = 41, 5  # where the error is computed; at first only every fifth
 SMALLEST = np.finfo(np.float64).tiny
-DISTINCT = 1e-6  # of the largest singular value: probes that differ by less are dependent
-ROUND_OFF = 1e-12  # of a direction: a smaller remainder after orthogonalisation is round-off
-DEPENDENT = 1e-10  # squared sine below which a direction is not new
-ALIKE = 1e-6  # squared sine below which directions are orthonormalised once more
-LEFT = 0.3  # of the tolerance: error of weak start vectors that have no more moments
-AT_ONCE = 32  # vectors multiplied together
-# Rows of tall matrices per inner product, so that they stay in the processor's cache: 100 by 5
-# inner products of 128,000 rows take 5.5 ms, and 18 ms by one multiplication.
-ROWS = 512
 
 
 class NotReduced(ValueError):
@@ -249,13 +232,17 @@ class KrylovBasis:
         gram = block.T @ product - second.T @ second
         block -= _combine(Q, second)
         size = np.sqrt(np.maximum(np.diag(gram), 0.0))
+        # Of a direction: a smaller remainder after orthogonalisation is round-off.
+        round_off = 1e-12
         # A space that spans all dofs of a body has no new direction.
-        inverse = np.divide(1, size, out=np.zeros_like(size), where=size > ROUND_OFF * scale)
+        inverse = np.divide(1, size, out=np.zeros_like(size), where=size > round_off * scale)
         squares, directions = np.linalg.eigh(gram * np.outer(inverse, inverse))
-        distinct = squares > max(DEPENDENT * squares.max(), SMALLEST)
+        dependent = 1e-10  # squared sine below which a direction is not new
+        distinct = squares > max(dependent * squares.max(), SMALLEST)
         squares, directions = squares[distinct], directions[:, distinct]
         upright = inverse[:, None] * directions / np.sqrt(squares)
-        if len(squares) and squares.min() < ALIKE * squares.max():
+        alike = 1e-6  # squared sine below which directions are orthonormalised once more
+        if len(squares) and squares.min() < alike * squares.max():
             upright = self._reorthonormalise(block, upright)
         start, self.size = self.size, self.size + upright.shape[1]
         np.matmul(block, upright, out=self._columns[:, start : self.size])
@@ -296,12 +283,19 @@ def _iterate(
     moment.
     """
     probes, left = len(directions), 0.0
+    frequencies, coarse_step = 41, 5  # where the error is computed; at first only every fifth
     # Not 0 Hz itself, where an unconstrained body has no finite response.
-    fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, FREQUENCIES), np.complex128)
-    coarse = fine[::COARSE_STEP]  # until the error is below the tolerance there
+    fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, frequencies), np.complex128)
+    coarse = fine[::coarse_step]  # until the error is below the tolerance there
     at, before, response, first, error = 0, (0, 0), None, np.inf, np.inf
+    # Moments between two error estimates: at least this many, which give the error to a factor of
+    # 4, and this share of all, because estimating the error of a large model costs more than its
+    # moments.
+    fewest_between = 3
+    share_between = 1 / 16
+    weak_share = 0.3  # of the tolerance: error of weak start vectors that have no more moments
     for moments, size in growing:
-        if moments < at + max(FEWEST_BETWEEN, SHARE_BETWEEN * moments):
+        if moments < at + max(fewest_between, share_between * moments):
             continue
         at = moments
         space.project(rows, size)
@@ -317,7 +311,7 @@ def _iterate(
             if weighted:
                 each = _changes(response, now, weighted, directions)[:, : space.followed]
                 ends = np.sqrt(np.cumsum(each[:, ::-1] ** 2, axis=1)).max(axis=0)[::-1]
-                weak = np.hypot(ends, left) <= LEFT * tolerance
+                weak = np.hypot(ends, left) <= weak_share * tolerance
                 space.followed = max(1, int(np.count_nonzero(~weak)))
                 left = float(np.hypot(left, ends[space.followed :].max(initial=0.0)))
             first = error if first == np.inf else first
@@ -335,8 +329,12 @@ def _expansion(
     operators: Operators, air: Air | None, band: float, point: float
 ) -> tuple[float, Operators]:
     """Return the expansion point in rad/s, and the operators with the added mass."""
+    # Expansion point over the band with Maxwell branches, where waves of high frequency lose little
+    # and many of them matter. Best between 0.8 and 1.6; the point above needs nearly twice as many
+    # moments.
+    relaxing_point = 1.0
     if air is None:
-        return 2 * np.pi * RELAXING_POINT * band if operators.branches else point, operators
+        return 2 * np.pi * relaxing_point * band if operators.branches else point, operators
     return 0.0, replace(operators, M=aslinearoperator(operators.M) + air.mass)
 
 
@@ -346,7 +344,8 @@ def _independent(start_vectors: Floats) -> tuple[Floats, Floats]:
     element may be linearly dependent.
     """
     squares, directions = np.linalg.eigh(start_vectors.T @ start_vectors)
-    distinct = squares > DISTINCT**2 * squares[-1]
+    probe_rank = 1e-6  # of the largest singular value: probes that differ by less are dependent
+    distinct = squares > probe_rank**2 * squares[-1]
     directions = directions[:, distinct][:, ::-1]
     return start_vectors @ (directions / np.sqrt(squares[distinct])[::-1]), directions
 
@@ -398,8 +397,11 @@ def _combine(basis: Floats, coordinates: Floats) -> Floats:
 def _inner(basis: Floats, block: Floats) -> Floats:
     """Return the inner products basis^T block (size, k) of tall matrices."""
     products = np.zeros((block.shape[1], basis.shape[1]))
-    for start in range(0, len(basis), ROWS):
-        products += block[start : start + ROWS].T @ basis[start : start + ROWS]
+    # Rows of tall matrices per inner product, so that they stay in the processor's cache: 100 by 5
+    # inner products of 128,000 rows take 5.5 ms, and 18 ms by one multiplication.
+    rows = 512
+    for start in range(0, len(basis), rows):
+        products += block[start : start + rows].T @ basis[start : start + rows]
     return products.T
 
 
@@ -427,8 +429,9 @@ def _orthonormalise(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
 
 def _products(A: Any, basis: Floats, vectors: Floats) -> Floats:
     """Return basis^T A vectors (size, k), some vectors at a time."""
-    starts = range(0, vectors.shape[1], AT_ONCE)
-    columns = [_inner(basis, A @ vectors[:, k : k + AT_ONCE]) for k in starts]
+    at_once = 32  # vectors multiplied together
+    starts = range(0, vectors.shape[1], at_once)
+    columns = [_inner(basis, A @ vectors[:, k : k + at_once]) for k in starts]
     return np.hstack(columns) if columns else np.empty((basis.shape[1], 0))
 
 

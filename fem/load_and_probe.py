@@ -16,13 +16,6 @@ from meshes import TetMesh, facet_set
 
 FACET_MARGIN = 1e-6  # barycentric: points this close outside a facet count as on it
 NEWTON_TOLERANCE = 1e-9  # of a facet's size
-NEWTON_STEPS, NEWTON_REACH = 12, 3.0  # most steps; barycentric coordinate beyond which it stops
-EDGE_ON_AREA = 1e-9  # of a facet's squared size: the projected area of a facet seen edge-on
-SAME_HEIGHT = 1e-6  # of the surface's extent: neighbouring facets with this difference are level
-AT_ONCE = 2_000_000  # pairs of points and facets
-ELEMENT_MARGIN = 1e-6  # barycentric: points this close outside all elements count as inside
-BOWED_MARGIN = 0.3  # of an element's size: likewise for the straight element of a curved one
-BULGE = 0.05  # of an element's size: how far a curved element may extend beyond its corners
 NODES = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])  # of a facet
 
 
@@ -190,7 +183,8 @@ def _surface_frame(
 def _mean_normals(mesh: TetMesh, nodes: Ints, places: Floats, patch: float) -> Floats:
     """Return normals (p, 3) of facets (k, a), averaged by area and distance to places."""
     at, areas = facet_points(mesh, nodes), facet_geometry(mesh, nodes)[1].reshape(-1, 3)
-    normals, count = np.empty((len(places), 3)), max(1, AT_ONCE // len(at))
+    at_once = 2_000_000  # pairs of points and facets
+    normals, count = np.empty((len(places), 3)), max(1, at_once // len(at))
     for start in range(0, len(places), count):
         part = slice(start, start + count)
         squared = ((places[part, None] - at) ** 2).sum(axis=2)
@@ -250,7 +244,9 @@ def facets_below(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
         "ma,ma->m", shape_functions(barycentric, facets.shape[1]), facets[facet, :, 2]
     )
     size = np.ptp(facets[:, :, :2], axis=(0, 1)).max(initial=0.0)
-    level = np.rint(height / (SAME_HEIGHT * size or 1.0))
+    # Of the surface's extent: neighbouring facets with this difference are level.
+    same_height = 1e-6
+    level = np.rint(height / (same_height * size or 1.0))
     # The last is the highest; of neighbours that share an edge, the one the point is deepest in.
     order = np.lexsort((barycentric.min(axis=1), level, point))
     last = order[np.append(np.diff(point[order]) > 0, True)[: len(order)]]
@@ -289,12 +285,14 @@ def _facet_coordinates(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
     coordinates = np.full((len(points), 3), 1 / 3)
     size = np.ptp(facets, axis=1).max(axis=1, initial=0.0)
     distance, active = np.full(len(points), np.inf), np.arange(len(points))
-    for _ in range(NEWTON_STEPS):
+    newton_steps, newton_reach = 12, 3.0  # most steps; barycentric coordinate beyond which it stops
+    edge_on_area = 1e-9  # of a facet's squared size: the projected area of a facet seen edge-on
+    for _ in range(newton_steps):
         miss, tangents = _offsets(facets[active], coordinates[active], points[active])
         distance[active] = np.linalg.norm(miss, axis=1) / size[active]
         (a, b), (c, d) = np.moveaxis(tangents, 0, 2)
         area = a * d - b * c
-        edge_on = np.abs(area) < EDGE_ON_AREA * size[active] ** 2
+        edge_on = np.abs(area) < edge_on_area * size[active] ** 2
         distance[active[edge_on]] = np.inf
         going = ~edge_on & (distance[active] > NEWTON_TOLERANCE)
         miss, area = miss[going], area[going]
@@ -303,7 +301,7 @@ def _facet_coordinates(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
         active = active[going]
         coordinates[active] += np.column_stack([-second - third, second, third])
         largest = np.abs(coordinates[active]).max(axis=1, initial=0.0)
-        active = active[largest < NEWTON_REACH]
+        active = active[largest < newton_reach]
         if not len(active):
             break
     is_inside = coordinates.min(axis=1) >= -FACET_MARGIN
@@ -347,7 +345,8 @@ def _elements_at(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
     """Return the element (p,) and coordinates (p, 4) of each point, and whether it is inside."""
     corners = mesh.points[mesh.tets[:, :4]]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    slack = BULGE * (high - low).max(axis=1, keepdims=True)
+    bulge = 0.05  # of an element's size: how far a curved element may extend beyond its corners
+    slack = bulge * (high - low).max(axis=1, keepdims=True)
     low, high = low - slack, high + slack
     elements = [_containing(corners, low, high, point) for point in points]
     owner = np.array([element for element, _ in elements])
@@ -356,7 +355,9 @@ def _elements_at(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
     if mesh.order == 2:
         nodes = mesh.points[mesh.tets[owner[inside]]]
         barycentric[inside] = curved_coordinates(nodes, barycentric[inside], points[inside])
-    inside[inside] = barycentric[inside].min(axis=1) >= -BOWED_MARGIN * BULGE - ELEMENT_MARGIN
+    element_margin = 1e-6  # barycentric: points this close outside all elements count as inside
+    bowed_margin = 0.3  # of an element's size: likewise for the straight element of a curved one
+    inside[inside] = barycentric[inside].min(axis=1) >= -bowed_margin * bulge - element_margin
     return owner, barycentric, inside
 
 

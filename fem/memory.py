@@ -6,7 +6,6 @@ from pathlib import Path
 # Matrices, temporaries of the assembly and Krylov vectors, without the factor: measured as 7.9 to
 # 8.3 kB for slabs of 76,000 to 260,000 dofs with five probes.
 BYTES_PER_DOF = 8.3e3
-CGROUP = Path("/sys/fs/cgroup")
 
 
 def check_memory(dofs: int) -> None:
@@ -35,9 +34,10 @@ def _free_of_machine() -> float:
 
 
 def _free_of_container() -> float:
+    cgroup = Path("/sys/fs/cgroup")
     try:
-        limit = (CGROUP / "memory.max").read_text(encoding="ascii").strip()
-        used = (CGROUP / "memory.current").read_text(encoding="ascii")
+        limit = (cgroup / "memory.max").read_text(encoding="ascii").strip()
+        used = (cgroup / "memory.current").read_text(encoding="ascii")
     except OSError:
         return math.inf
     return math.inf if limit == "max" else float(limit) - float(used)

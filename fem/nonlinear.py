@@ -24,9 +24,7 @@ from fem.typing import Floats
 
 MOST_ITERATIONS = 25
 MOST_HALVINGS = 6  # of a load or time step
-SLOW = 0.3  # ratio of successive corrections above which the tangent is factorised again
 ROUND_OFF = 1e-5  # of the load: a smaller residual is judged by the correction it causes
-STANDSTILL = 1e-6  # of the displacement: smallest scale of a step's correction
 
 
 class _Stuck(ArithmeticError):
@@ -244,6 +242,8 @@ class _March:
         predicted = now.u + dt * now.v + dt**2 / 4 * now.a
         f = self.force(until)[free]
         load = f + now.force
+        slow = 0.3  # ratio of successive corrections above which the tangent is factorised again
+        standstill = 1e-6  # of the displacement: smallest scale of a step's correction
         for _ in range(MOST_ITERATIONS):
             u = predicted + dt**2 / 4 * a
             v = now.v + dt / 2 * (now.a + a)
@@ -257,10 +257,10 @@ class _March:
             except ValueError:  # the tangent is not positive definite
                 break
             a = a + change
-            sizes = (u - now.u, dt**2 / 4 * a, STANDSTILL * u)
+            sizes = (u - now.u, dt**2 / 4 * a, standstill * u)
             step = max(float(np.linalg.norm(size)) for size in sizes)
             left = dt**2 / 4 * float(np.linalg.norm(change)) / (step or 1.0)
-            shrinks = left <= max(SLOW * before, tolerance / 100)
+            shrinks = left <= max(slow * before, tolerance / 100)
             if left <= tolerance and (shrinks or before <= tolerance):
                 # The remaining error is the square of this correction or, with an old tangent, a
                 # small part of it. The balance of forces replaces another residual.
@@ -269,7 +269,7 @@ class _March:
                 strain, stretch = self._branch_stretches(now, u, shares)
                 return _Moment(t=until, u=u, v=v, a=a, force=f, internal=internal,
                                strain=strain, stretch=stretch)  # fmt: skip
-            if left > SLOW * before:
+            if left > slow * before:
                 self.factors.pop(halvings)
             before = left
         raise _Stuck(residual)

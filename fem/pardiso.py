@@ -27,12 +27,8 @@ from fem.typing import Array, Index
 
 log = logging.getLogger(__name__)
 
-SPARSE = 0.1  # share of n^2 in the upper triangle; blocks of denser matrices may crash PARDISO
-BLOCKS = 80  # %: similarity of the patterns of rows that PARDISO orders as a block
-TWO_LEVELS, SINGLE, BY_BLOCKS, OUT_OF_CORE = 23, 27, 36, 59  # indices of its settings
+TWO_LEVELS, SINGLE, BY_BLOCKS = 23, 27, 36  # indices of its settings
 IN_CORE = 0.8  # of the free memory, at most, for a factor; vectors need the rest
-LEAST_CORE = 500  # MB of memory that it needs besides the files
-PHASES = {"analyse": 11, "factorise": 22, "solve": 33, "release": -1}
 
 
 class PardisoError(ArithmeticError):
@@ -61,8 +57,11 @@ class Pardiso:
         self._settings[[0, 1, 7]] = 1, 2, 0  # own settings, METIS, no refinement
         self._settings[[9, TWO_LEVELS]] = 16, 1  # perturbation of pivots
         self._settings[SINGLE] = single
-        if len(indices) < SPARSE * self._n**2:
-            self._settings[BY_BLOCKS] = -BLOCKS
+        # Share of n^2 in the upper triangle; blocks of denser matrices may crash PARDISO.
+        sparse = 0.1
+        blocks = 80  # %: similarity of the patterns of rows that PARDISO orders as a block
+        if len(indices) < sparse * self._n**2:
+            self._settings[BY_BLOCKS] = -blocks
         self._values: Array = np.zeros(0)
         self._scale, self._folders = 1.0, list[str]()
         self._analysed, self._environment = False, partial(_environment, None, 0.0)
@@ -90,7 +89,8 @@ class Pardiso:
         self._folders.append(_folder(self._n, size, limit))
         # Out of core, blocks and two levels make some solutions 30 times slower.
         self._run("release")
-        self._settings[[TWO_LEVELS, BY_BLOCKS]], self._settings[OUT_OF_CORE] = 0, 2
+        out_of_core = 59  # indices of its settings
+        self._settings[[TWO_LEVELS, BY_BLOCKS]], self._settings[out_of_core] = 0, 2
         self._environment = partial(_environment, self._folders[0], limit)
         with self._environment():
             self._run("analyse")
@@ -128,8 +128,9 @@ def _call(
     x = np.zeros_like(b, order="F")
     error = ctypes.c_int32(0)
     pointer = ctypes.c_void_p
+    phases = {"analyse": 11, "factorise": 22, "solve": 33, "release": -1}
     mkl().pardiso(  # type: ignore[union-attr]
-        handle.ctypes.data_as(pointer), *_integers(1, 1, kind, PHASES[phase], n),
+        handle.ctypes.data_as(pointer), *_integers(1, 1, kind, phases[phase], n),
         values.ctypes.data_as(pointer), indptr.ctypes.data_as(pointer),
         indices.ctypes.data_as(pointer), None, *_integers(right),
         settings.ctypes.data_as(pointer), *_integers(0),
@@ -164,7 +165,8 @@ def _folder(n: int, size: float, limit: float) -> str:
 @contextmanager
 def _environment(folder: str | None, limit: float) -> Iterator[None]:
     """Set the folder of PARDISO's files, if any, and the memory in bytes that it may use."""
-    core = max(LEAST_CORE, round(IN_CORE * limit / 2**20))
+    least_core = 500  # MB of memory that it needs besides the files
+    core = max(least_core, round(IN_CORE * limit / 2**20))
     wanted = {"MKL_PARDISO_OOC_PATH": folder, "MKL_PARDISO_OOC_MAX_CORE_SIZE": str(core)}
     before = {name: os.environ[name] for name in wanted if name in os.environ}
     os.environ.update({name: value for name, value in wanted.items() if folder and value})

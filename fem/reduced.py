@@ -24,9 +24,6 @@ from fem.harmonic import dynamic_stiffness
 from fem.maxwell import maxwell_only
 from fem.typing import Complex, Floats
 
-CHUNK = 256  # times that share their exponentials
-MOST_RATES = 8192  # rates summed at a time, to bound memory
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedModel:
@@ -166,11 +163,13 @@ def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Float
     Exponentials are products of those within the first chunk of times and at the start of each.
     """
     j, p = amplitudes.shape
-    if j > MOST_RATES:
-        parts = [slice(k, k + MOST_RATES) for k in range(0, j, MOST_RATES)]
+    most_rates = 8192  # rates summed at a time, to bound memory
+    if j > most_rates:
+        parts = [slice(k, k + most_rates) for k in range(0, j, most_rates)]
         return np.sum([exponential_sum(rates[k], amplitudes[k], times) for k in parts], axis=0)
-    within = np.exp(rates * times[:CHUNK, None])
-    starts = np.exp(rates * times[::CHUNK, None])
+    chunk = 256  # times that share their exponentials
+    within = np.exp(rates * times[:chunk, None])
+    starts = np.exp(rates * times[::chunk, None])
     driven = (starts[:, :, None] * amplitudes).transpose(1, 0, 2).reshape(j, len(starts) * p)
     summed = within.real @ driven.real - within.imag @ driven.imag
     return summed.reshape(len(within), len(starts), p).swapaxes(0, 1).reshape(-1, p)[: len(times)]

@@ -42,10 +42,6 @@ from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh
 from simple_model.layers.material import Material
 
-PAIRS = 200  # of modes, for which the in-plane problem is solved
-RESONANT = 2 * np.pi * 200.0  # rad/s: modes below are weighted equally
-SMALLEST_STATE = 1e-2  # of the energy norm of the largest
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StretchingModes:
@@ -199,9 +195,11 @@ def _states_of_stress(
     part: Part, fixed: Bools, slopes: Floats, hz: Floats, solver: str
 ) -> tuple[Floats, float]:
     """Return strains of energy-orthonormal states of stress, and the truncated share."""
-    reach = 1 / np.maximum(2 * np.pi * hz, RESONANT) ** 2
+    resonant = 2 * np.pi * 200.0  # rad/s: modes below are weighted equally
+    reach = 1 / np.maximum(2 * np.pi * hz, resonant) ** 2
     i, j = np.triu_indices(len(reach))
-    strongest = np.argsort(-reach[i] * reach[j], kind="stable")[:PAIRS]
+    pairs = 200  # of modes, for which the in-plane problem is solved
+    strongest = np.argsort(-reach[i] * reach[j], kind="stable")[:pairs]
     i, j = i[strongest], j[strongest]
     weight = reach[i] * reach[j] * np.where(i == j, 1, 2)
     incompatible = []
@@ -213,7 +211,8 @@ def _states_of_stress(
     stresses = np.array([stress(part, s) * part.volume[..., None, None] for s in strains])
     gram = strains.reshape(len(i), -1) @ stresses.reshape(len(i), -1).T
     squares, vectors = np.linalg.eigh((gram + gram.T) / 2)
-    large = squares > SMALLEST_STATE**2 * squares.max()
+    smallest_state = 1e-2  # of the energy norm of the largest
+    large = squares > smallest_state**2 * squares.max()
     states = np.tensordot((vectors[:, large] / np.sqrt(squares[large])).T[::-1], strains, axes=1)
     return states, float(np.sqrt(squares[~large].clip(0).sum() / squares.sum()))
 

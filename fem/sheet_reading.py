@@ -25,7 +25,6 @@ from fem.typing import Floats, Ints
 from meshes import TetMesh
 
 PAIRS = ((0, 0), (1, 1), (0, 1))  # xx, yy, xy
-EDGE_MARGIN = 1e-9  # barycentric: points this close outside all triangles are on the sheet
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,11 +142,12 @@ def _locate(places: Floats, triangles: Ints, points: Floats) -> tuple[Ints, Floa
     """Return the triangle (p,) of each point, and its barycentric coordinates (p, 3)."""
     corners = places[triangles[:, :3]]
     owner, inner = np.empty(len(points), np.int64), np.empty((len(points), 3))
+    edge_margin = 1e-9  # barycentric: points this close outside all triangles are on the sheet
     for p, point in enumerate(points):
         coordinates = straight_coordinates(corners, point)
         owner[p] = coordinates.min(axis=1).argmax()
         inner[p] = coordinates[owner[p]]
-        if inner[p].min() < -EDGE_MARGIN:
+        if inner[p].min() < -edge_margin:
             x, y = 1e3 * point
             raise ValueError(f"point ({x:g}, {y:g}) mm is off the sheet; move it inside")
     return owner, inner

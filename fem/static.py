@@ -12,8 +12,6 @@ from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged
 from fem.typing import Floats
 
-FREE_SHIFTS = (1e-6, 1e-9, 1e-12)  # of the square of the highest frequency, for free bodies
-RIGID = 1e-14  # of that square: below it a mode is a rigid-body mode
 MOST_RESTARTS = 40  # of the Lanczos method
 
 
@@ -109,6 +107,7 @@ def _inverses(operators: Operators, solver: str) -> Iterator[tuple[float, Factor
     """
     K, M = operators.K, operators.M
     scale = K.trace() / M.trace()
+    rigid = 1e-14  # of that square: below it a mode is a rigid-body mode
     try:
         factor = factorise(K, backend=solver)
     except ValueError:
@@ -116,9 +115,10 @@ def _inverses(operators: Operators, solver: str) -> Iterator[tuple[float, Factor
     else:
         # Inverse iteration approaches a rigid-body mode if there is one; its energy is round-off.
         u = factor.solve(M @ np.random.default_rng(0).standard_normal(len(operators.free)))
-        is_constrained = bool(u @ (K @ u) > RIGID * scale * (u @ (M @ u)))
+        is_constrained = bool(u @ (K @ u) > rigid * scale * (u @ (M @ u)))
     if is_constrained:
         yield 0.0, factor
         return
-    for part in FREE_SHIFTS:
+    free_shifts = (1e-6, 1e-9, 1e-12)  # of the square of the highest frequency, for free bodies
+    for part in free_shifts:
         yield part * scale, factorise(K + part * scale * M, backend=solver)

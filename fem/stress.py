@@ -37,12 +37,9 @@ from meshes.tetmesh import EDGES
 from simple_model.layers.material import Material
 from simple_model.layers.tensors import DIAGONAL, MEAN, TENSOR
 
-TOUCHING = 1e-6  # barycentric: points this close outside an element touch it
 POINTS = 4  # quadrature points of an element, of the rule for degree 2
 LOCALITY = 1.0  # weight exp(-LOCALITY d^2) of a sample d elements from the point; 0.7 to 5 tried
-AT_ONCE = 100  # corner nodes whose elements are processed together
 DEGREES = (3, 2, 1, 0)  # of polynomials; the highest that the samples determine is used
-INDEPENDENT = 1e-8  # of the largest singular value
 # Symmetric gradient: e_c = sum_ij SYMMETRIC[c, i, j] u_j,i
 SYMMETRIC = np.array([[[(i, j) in (c, c[::-1]) for j in range(3)] for i in range(3)]
                       for c in TENSOR]) / np.array([1, 1, 1, 2, 2, 2])[:, None, None]  # fmt: skip
@@ -150,7 +147,8 @@ def _patch(mesh: TetMesh, owner: int, point: Floats) -> Ints:
     tets = mesh.tets[:, :4]
     near = np.flatnonzero(np.isin(tets, tets[owner]).any(axis=1))
     depth = straight_coordinates(mesh.points[tets[near]], point).min(axis=1)
-    touching = near[depth > -TOUCHING]
+    margin = 1e-6  # barycentric: points this close outside an element touch it
+    touching = near[depth > -margin]
     core = touching if len(touching) else np.array([owner])
     return np.flatnonzero(np.isin(tets, tets[core]).any(axis=1))
 
@@ -191,10 +189,11 @@ def fitted_polynomial(x: Floats) -> tuple[Floats, int]:
     the degree.
     """
     root = np.exp(-LOCALITY / 2 * (x**2).sum(axis=1))  # of the weights
+    independent = 1e-8  # of the largest singular value
     for degree in DEGREES:
         fitted = root[:, None] * polynomials(x, degree)
         left, sizes, right = np.linalg.svd(fitted, full_matrices=False)
-        enough = len(x) >= 2 * len(sizes) and sizes[-1] > INDEPENDENT * sizes[0]
+        enough = len(x) >= 2 * len(sizes) and sizes[-1] > independent * sizes[0]
         if enough or degree == DEGREES[-1]:
             break
     return np.asarray((right.T / sizes) @ left.T * root), degree
@@ -273,7 +272,8 @@ def nodal_strain(part: SolidPart, u: Floats, wanted: Ints | None = None) -> Floa
         dilatation = (dilatation_operator(mesh, each) @ u).reshape(len(each), POINTS, -1)
     strain = np.zeros((len(nodes), 6, u.shape[1]))
     corners = np.array(sorted(by_corner), np.int64)
-    for some in np.array_split(corners, -(-len(corners) // AT_ONCE)):
+    at_once = 100  # corner nodes whose elements are processed together
+    for some in np.array_split(corners, -(-len(corners) // at_once)):
         patches = _patches(mesh, some)
         used = np.unique(np.concatenate(patches))
         samples = (_strain_rows(mesh, used) @ u).reshape(len(used), POINTS, 6, -1)
