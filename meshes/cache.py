@@ -21,7 +21,6 @@ from meshes import reading
 
 LIMIT = 5 * 2**30  # bytes of all entries
 ENTRY = re.compile(r"[0-9a-f]{32}(\.npz|\.\w+\.part)")  # names of entries and unfinished ones
-ABANDONED_AFTER = 86_400.0  # s, of unfinished entries
 
 
 def folder() -> Path | None:
@@ -101,8 +100,9 @@ def _keep_within(limit: int, home: Path, newest: str) -> None:
             with contextlib.suppress(FileNotFoundError):  # removed by another process
                 entries[path] = path.lstat()
     size = sum(status.st_size for status in entries.values())
+    abandoned_after = 86_400.0  # s, of unfinished entries
     for path, status in sorted(entries.items(), key=lambda each: each[1].st_mtime_ns):
-        abandoned = path.suffix == ".part" and time.time() - status.st_mtime > ABANDONED_AFTER
+        abandoned = path.suffix == ".part" and time.time() - status.st_mtime > abandoned_after
         if abandoned or (size > limit and path.suffix == ".npz" and path.name != newest):
             path.unlink(missing_ok=True)
             size -= status.st_size

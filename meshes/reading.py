@@ -15,9 +15,8 @@ import numpy as np
 from meshes.typing import Array
 
 LARGEST_TEXT = 16_000_000  # bytes
-MOST_UNPACKED, MOST_GROWTH = 500_000_000, 8  # bytes of an unpacked archive, or times its size
+MOST_UNPACKED = 500_000_000  # bytes of an unpacked archive, or times its size
 
-_BINARY = getattr(os, "O_BINARY", 0)
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")  # characters that text files do not have
 
 _SIGNATURES = {  # first bytes of files that users take for text
@@ -33,8 +32,9 @@ PathLike = str | os.PathLike[str]
 @contextmanager
 def open_regular(path: PathLike, limit: float = np.inf) -> Iterator[BinaryIO]:
     """Open a regular file of at most `limit` bytes, or raise a ValueError."""
+    binary = getattr(os, "O_BINARY", 0)
     try:  # without blocking, because a pipe may have no writer
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _BINARY)
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | binary)
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: cannot be read ({_reason(error)}); check the path") from None
     status = os.fstat(handle)
@@ -103,9 +103,10 @@ def read_exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
 
 def load_arrays(path: PathLike) -> dict[str, Array]:
     """Return the arrays of an .npz file by name; raise a ValueError if it unpacks to too much."""
+    most_growth = 8  # bytes of an unpacked archive, or times its size
     with open_regular(path) as file:
         try:
-            limit = max(MOST_UNPACKED, MOST_GROWTH * os.fstat(file.fileno()).st_size)
+            limit = max(MOST_UNPACKED, most_growth * os.fstat(file.fileno()).st_size)
             with zipfile.ZipFile(file) as archive:
                 size = sum(member.file_size for member in archive.infolist())
             if size > limit:

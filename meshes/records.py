@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-PACKAGES = ("fem", "meshes", "simple_model", "skinwave")  # whose dataclasses are read
-
 
 def encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:
     """Return a value as a structure for JSON, and add its arrays to `arrays`; raise a TypeError for
@@ -52,8 +50,9 @@ def decode(value: Any, arrays: Mapping[str, np.ndarray]) -> Any:
 def _kind(name: str) -> type:
     module, _, kind = name.partition(":")
     found: Any = None
-    if module.partition(".")[0] in PACKAGES:
+    packages = ("fem", "meshes", "simple_model", "skinwave")  # whose dataclasses are read
+    if module.partition(".")[0] in packages:
         found = getattr(import_module(module), kind, None)
     if not (isinstance(found, type) and is_dataclass(found)):
-        raise ValueError(f"{name} is not a dataclass of {', '.join(PACKAGES)}")
+        raise ValueError(f"{name} is not a dataclass of {', '.join(packages)}")
     return found

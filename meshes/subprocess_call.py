@@ -19,9 +19,7 @@ from meshes.tetmesh import MeshError
 
 # Limits for reading a file: constant part, and part per megabyte or byte of its size.
 LEAST_SECONDS, SECONDS = 60.0, 1.0
-LEAST_BYTES, BYTES = 800_000_000, 20
 LARGEST = 2_000_000_000  # bytes of a file
-BEGIN = "from meshes.subprocess_call import _serve; _serve()"
 T = TypeVar("T")
 
 
@@ -50,6 +48,7 @@ def call(function: Callable[..., T], *args: object, timeout: float, memory: int 
     """
     home = str(Path(__file__).parents[1])
     paths = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH")]))
+    begin = "from meshes.subprocess_call import _serve; _serve()"
     with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
         request, answer = Path(folder, "call"), Path(folder, "answer")
         request.write_bytes(pickle.dumps((function, args)))
@@ -57,7 +56,7 @@ def call(function: Callable[..., T], *args: object, timeout: float, memory: int 
         work.mkdir()
         try:
             ended = subprocess.run(
-                [sys.executable, "-P", "-c", BEGIN, str(int(timeout) + 2), str(memory), folder],
+                [sys.executable, "-P", "-c", begin, str(int(timeout) + 2), str(memory), folder],
                 cwd=work, timeout=timeout, text=True, errors="replace", check=False,
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                 env={**os.environ, "PYTHONPATH": paths},
@@ -81,7 +80,8 @@ def call_reader(function: Callable[[Path], T], path: Path) -> T:
         raise MeshError(
             f"{path} has {size / 1e6:,.0f} MB, more than the limit of {LARGEST / 1e6:,.0f} MB"
         )
-    seconds, memory = LEAST_SECONDS + SECONDS * size / 1e6, LEAST_BYTES + BYTES * size
+    least_bytes, bytes_each = 800_000_000, 20
+    seconds, memory = LEAST_SECONDS + SECONDS * size / 1e6, least_bytes + bytes_each * size
     try:
         return call(function, path.resolve(), timeout=seconds, memory=memory)
     except TimeoutError:

@@ -25,10 +25,7 @@ log = logging.getLogger(__name__)
 
 EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 FACES = np.array([[1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6], [0, 1, 3, 4, 8, 7], [0, 2, 1, 6, 5, 4]])
-# Swapping corners 2 and 3 inverts a tetrahedron; the mid-side nodes follow.
-MIRRORED = np.array([0, 1, 3, 2, 4, 8, 7, 6, 5, 9])
 VTK_KINDS, VTK_SETS = {4: 10, 10: 24}, "facets:"  # cell type by node count; prefix of facet sets
-FLATTEST = 1e-9  # volume over longest edge cubed: flatter tetrahedra have no usable shape
 FURTHEST = 1e50  # m: beyond it, products of lengths overflow
 
 
@@ -292,7 +289,8 @@ def _orient(points: Floats, tets: Ints) -> Ints:
     volume = corner_volumes(points, tets)
     corners = points[tets[:, EDGES]]
     longest = np.linalg.norm(corners[:, :, 1] - corners[:, :, 0], axis=2).max(axis=1)
-    flat = np.flatnonzero(np.abs(volume) <= FLATTEST * longest**3)
+    flattest = 1e-9  # volume over longest edge cubed: flatter tetrahedra have no usable shape
+    flat = np.flatnonzero(np.abs(volume) <= flattest * longest**3)
     if len(flat):
         worst = flat[np.argmin(np.abs(volume[flat]) / np.maximum(longest[flat] ** 3, 1e-300))]
         raise MeshError(
@@ -300,7 +298,9 @@ def _orient(points: Floats, tets: Ints) -> Ints:
             f"{volume[worst]:.3g} m3; remesh the body or remove them"
         )
     inside_out = volume < 0
+    # Swapping corners 2 and 3 inverts a tetrahedron; the mid-side nodes follow.
+    mirrored = np.array([0, 1, 3, 2, 4, 8, 7, 6, 5, 9])
     if inside_out.any():
         log.info("reordered %d inverted tetrahedra of %d", inside_out.sum(), len(tets))
-        tets[inside_out] = tets[inside_out][:, MIRRORED[: tets.shape[1]]]
+        tets[inside_out] = tets[inside_out][:, mirrored[: tets.shape[1]]]
     return tets

@@ -19,15 +19,9 @@ from meshes.reading import read_exported_text
 from meshes.tetmesh import MeshError
 from meshes.typing import Floats
 
-SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10"}  # by nodes
-FACES = {3: "triangle", 4: "quad"}
-# Keywords that generate, copy or move nodes and elements.
-GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
 INCLUDED = (
     r"(?im)^[ \t]*\*(?:INCLUDE|NODE|ELEMENT|ELSET)\b[^\n]*,\s*INPUT\s*=\s*\"?(?P<file>[^\",\n]+).*"
 )
-MOST_INCLUDED = 20  # levels of nested *INCLUDE
-LARGEST = 500_000_000  # bytes
 AGAIN = "save it again from the program that made it"
 
 Rows = list[list[str]]
@@ -50,8 +44,10 @@ def read_abaqus(path: Path) -> Any:
     loose = current = Part("")
     parts: dict[str, Part] = {}
     instances: list[tuple[Part, Rows]] = []
+    # Keywords that generate, copy or move nodes and elements.
+    generating = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
     for keyword, options, rows in _blocks(path):
-        if keyword in GENERATING or (keyword == "NODE" and options.get("SYSTEM", "R") != "R"):
+        if keyword in generating or (keyword == "NODE" and options.get("SYSTEM", "R") != "R"):
             raise MeshError(
                 f"{path} has *{keyword}, which generates nodes or elements; save it from "
                 "Abaqus/CAE or as .vtu with all of them written out"
@@ -82,8 +78,9 @@ def expanded(path: Path, pattern: str = "(?!)", level: int = 0) -> str:
         before = "" if "INCLUDE" in match[0].upper() else match[0] + "\n"
         return before + expanded(include(path, match["file"].strip(), level), pattern, level + 1)
 
+    largest = 500_000_000  # bytes
     try:
-        return re.sub(pattern, other, read_exported_text(path, LARGEST))
+        return re.sub(pattern, other, read_exported_text(path, largest))
     except ValueError as error:
         raise MeshError(str(error)) from None
 
@@ -91,7 +88,8 @@ def expanded(path: Path, pattern: str = "(?!)", level: int = 0) -> str:
 def include(path: Path, name: str, level: int = 0) -> Path:
     """Return the path of a file that another one includes at a level of nesting."""
     other = path.parent / name
-    if level == MOST_INCLUDED or not other.is_file():
+    most_included = 20  # levels of nested *INCLUDE
+    if level == most_included or not other.is_file():
         raise MeshError(f"{path} includes '{name}', which is missing; copy it there")
     return other
 
@@ -182,9 +180,11 @@ def join_parts(path: Path, placed: list[tuple[Part, Rows]]) -> Any:
 
 def _kind(kind: str, nodes: int) -> str | None:
     """meshio's name of an element type with this number of nodes; None if unknown."""
+    solids = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10"}  # by nodes
     if expected := _solid_nodes(kind):
-        return SOLIDS.get(nodes, kind) if nodes == expected else kind
-    return FACES.get(nodes) if re.match(r"(?:S|STRI|M3D|R3D|SFM3D)[34]", kind) else None
+        return solids.get(nodes, kind) if nodes == expected else kind
+    faces = {3: "triangle", 4: "quad"}
+    return faces.get(nodes) if re.match(r"(?:S|STRI|M3D|R3D|SFM3D)[34]", kind) else None
 
 
 def _solid_nodes(kind: str) -> int:

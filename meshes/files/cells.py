@@ -17,9 +17,7 @@ from meshes.typing import Floats, Ints
 FACETS, REGION, NAMED = "facets:", "region ", "region:"
 # Cell arrays with region numbers, of this package, of others, and of meshio's readers.
 PHYSICAL = "gmsh:physical"
-NUMBERED = ("region", "material", "medit:ref", "cell_tags", PHYSICAL)
 NO_REGIONS = re.compile(rf"{FACETS}|{NAMED}|.*(ghost|rank|partition|process)", re.IGNORECASE)
-OFF_MIDDLE = 0.25  # of the length of an edge: how far its mid-side node may lie from the middle
 
 # Corners of the faces of the solid elements that are split into tetrahedra.
 SPLIT = {
@@ -30,9 +28,6 @@ SPLIT = {
 }  # fmt: skip
 SOLID = ("tetra", "tetra10", *SPLIT)
 PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  # corners
-SMALLER = ("vertex", "line", "line3")
-MESHED = "make a closed surface of them, as by screened Poisson reconstruction in MeshLab"
-FLAT = 1e-9  # of the volume of its cell: smaller tetrahedra come from a collapsed cell
 
 
 Arrays = dict[str, dict[str, np.ndarray]]  # by name and kind of cell
@@ -68,19 +63,21 @@ def contents(path: Path, raw: Any) -> Contents:
         if nodes.min() < 0 or nodes.max() >= len(raw.points):
             raise MeshError(f"{path} has cells that refer to missing points; save it again")
     solid = [kind for kind in SOLID if kind in cells]
-    unknown = [kind for kind in cells if kind not in (*SOLID, *PLANE, *SMALLER)]
+    smaller = ("vertex", "line", "line3")
+    unknown = [kind for kind in cells if kind not in (*SOLID, *PLANE, *smaller)]
     if unknown or ("tetra10" in solid and len(solid) > 1):
         listed = ", ".join(f"{len(cells[kind]):,} of type {kind}" for kind in unknown or solid)
         raise MeshError(
             f"{path} has unsupported cells ({listed}); save only 4- or 10-node tetrahedra"
         )
+    meshed = "make a closed surface of them, as by screened Poisson reconstruction in MeshLab"
     if not solid and cells.keys().isdisjoint(PLANE):
         what = "no triangles and no solid elements; give a file with a body"
         if len(raw.points) and cells.keys() <= {"vertex"}:
-            what = f"{len(raw.points):,} points without triangles; {MESHED}"
+            what = f"{len(raw.points):,} points without triangles; {meshed}"
         raise MeshError(f"{path} has {what}")
     notes = [
-        f"left out {len(cells[kind]):,} cells of type {kind}" for kind in SMALLER if kind in cells
+        f"left out {len(cells[kind]):,} cells of type {kind}" for kind in smaller if kind in cells
     ]
     notes = [*raw.info["notes"], *notes]
     points = np.zeros((len(raw.points), 3))
@@ -180,13 +177,14 @@ def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, In
     parts, cell = np.vstack(tets), np.concatenate(cells)
     volumes = corner_volumes(points, parts)
     size = np.bincount(cell, np.abs(volumes), len(nodes))
-    warped = np.abs(np.bincount(cell, volumes, len(nodes))) < (1 - FLAT) * size
+    flat = 1e-9  # of the volume of its cell: smaller tetrahedra come from a collapsed cell
+    warped = np.abs(np.bincount(cell, volumes, len(nodes))) < (1 - flat) * size
     if warped.any():
         raise MeshError(
             f"{path} has {warped.sum():,} cells of type {kind} that are too warped to split into "
             "tetrahedra; save it as tetrahedra"
         )
-    solid = np.abs(volumes) > FLAT * size[cell]
+    solid = np.abs(volumes) > flat * size[cell]
     return parts[solid], cell[solid]
 
 
@@ -199,7 +197,8 @@ def _tag(arrays: Arrays, solid: list[str], notes: list[str]) -> str:
         name: x for name, x in every.items()
         if x.ndim == 1 and (np.floor(x) == x).all() and np.abs(x).max() < 2**31
     }  # fmt: skip
-    usual = [name for name in NUMBERED if name in numbers]
+    numbered = ("region", "material", "medit:ref", "cell_tags", PHYSICAL)
+    usual = [name for name in numbered if name in numbers]
     if usual and (usual[0] != PHYSICAL or numbers[PHYSICAL].any()):
         return usual[0]
     several = [
@@ -295,15 +294,16 @@ def _node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
     away = np.linalg.norm(nodes[:, 4:, None] - middles[:, None], axis=3)
     away /= np.maximum(length[:, None], 1e-300)
     own = np.einsum("ejj->ej", away).max(axis=1)
-    if (own <= OFF_MIDDLE).all():
+    off_middle = 0.25  # of the length of an edge: how far its mid-side node may lie from the middle
+    if (own <= off_middle).all():
         return list(range(10))
     column = np.median(away, axis=0).argmin(axis=0)  # the node on each edge
-    off = away[:, column, range(6)].max(axis=1) > OFF_MIDDLE
+    off = away[:, column, range(6)].max(axis=1) > off_middle
     if sorted(column) == list(range(6)) and not off.any():
         return [*range(4), *(4 + column).tolist()]
-    count = int(min(off.sum(), (own > OFF_MIDDLE).sum()))
+    count = int(min(off.sum(), (own > off_middle).sum()))
     raise MeshError(
         f"{path} has {count:,} of {len(tets):,} tetrahedra with a mid-side node more than "
-        f"{OFF_MIDDLE:.0%} of its edge away from the middle; save it with straight edges, or in "
+        f"{off_middle:.0%} of its edge away from the middle; save it with straight edges, or in "
         "VTK's node order"
     )

@@ -28,9 +28,7 @@ from meshes.volume.quality import check_one_body, dihedral_angles, edge_lengths
 from meshes.volume.tetrahedralise import EPSILON, REST, check_size, graded, tetrahedralise
 
 FINE_RADIUS = 30e-3  # m about the middle of the palm, within which elements have the size h
-GROWTH, COARSEST = 1.25, 2.0  # of elements beyond it: size ratio of neighbours, limit over h
-SMALLEST, LARGEST = 5e-3, 1.0  # m: diagonal of a hand or part of one
-TYPICAL = 0.1  # m, likewise
+GROWTH = 1.25  # of elements beyond it: size ratio of neighbours, limit over h
 
 Say = Callable[[str], None]
 Progress = Callable[[str, float], None]
@@ -110,7 +108,8 @@ def body_from_file(
         bones = {name: cut for name, bone in bones.items() if (cut := cut_to_box(bone, clip)[0])}
     progress("filling it with tetrahedra", 0.0)
     check_size(surface, "h", h)
-    grading = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h)
+    coarsest = 2.0  # of elements beyond it: size ratio of neighbours, limit over h
+    grading = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest * h)
     mesh = tetrahedralise(surface, h, inner=bones, sizing=graded(h, grading), timeout=timeout)
     return _with_summary(_with_sides(mesh, planes, 2 * EPSILON * h), say)
 
@@ -142,12 +141,14 @@ def _check_plausible(path: PathLike, contents: Contents, unit: str) -> None:
     """Check that a body has the size of a hand, or of part of one, in the unit of its file."""
     used = contents.points[np.unique(contents.tets if len(contents.tets) else contents.triangles)]
     size = float(np.linalg.norm(np.ptp(used, axis=0)))
-    if SMALLEST < size * scale_of(unit) < LARGEST:
+    smallest, largest = 5e-3, 1.0  # m: diagonal of a hand or part of one
+    if smallest < size * scale_of(unit) < largest:
         return
-    likely = min(UNITS, key=lambda name: abs(np.log(max(size, 1e-300) * UNITS[name] / TYPICAL)))
+    typical = 0.1  # m, likewise
+    likely = min(UNITS, key=lambda name: abs(np.log(max(size, 1e-300) * UNITS[name] / typical)))
     raise MeshError(
         f"{path} is {1e3 * size * scale_of(unit):.3g} mm from corner to corner if its unit is "
-        f"{unit}, but a hand or part of one has {1e3 * SMALLEST:g} to {1e3 * LARGEST:g} mm; give "
+        f"{unit}, but a hand or part of one has {1e3 * smallest:g} to {1e3 * largest:g} mm; give "
         f'its unit, probably {likely} (--unit {likely}, or unit = "{likely}" in [body])'
     )
 

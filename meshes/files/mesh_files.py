@@ -27,7 +27,6 @@ BY_VTK = (
     ".ply", ".obj", ".glb", ".gltf",
 )  # fmt: skip
 FORMATS = (*BY_VTK, *BY_MESHIO, *OWN)
-SEVERAL_FILES = (".pvtu", ".vtm", ".xdmf", ".xmf", ".gltf", *OWN)  # which name other files
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # gmsh cannot read the version 4.1 of meshio
 
@@ -44,7 +43,8 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
     if not path.is_file():
         raise MeshError(f"{path} does not exist; check its name")
     written = path.stat()
-    read = _read.__wrapped__ if path.suffix.lower() in SEVERAL_FILES else _read
+    several_files = (".pvtu", ".vtm", ".xdmf", ".xmf", ".gltf", *OWN)  # which name other files
+    read = _read.__wrapped__ if path.suffix.lower() in several_files else _read
     try:
         return read(path, written.st_mtime_ns, written.st_size)
     except subprocess_call.Crashed:

@@ -24,15 +24,7 @@ from meshes.typing import Floats
 
 BY_MESHIO = {".msh": "gmsh", ".mesh": "medit", ".med": "med", ".off": "off"}
 OTHERWISE = "save it as .vtu (ParaView, meshio convert) or .msh (gmsh)"
-VTK_CELLS = {
-    1: "vertex", 3: "line", 5: "triangle", 9: "quad", 10: "tetra", 11: "hexahedron",
-    12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8",
-    24: "tetra10",
-}  # fmt: skip
-XDMF_KINDS = {"Tetrahedron_10": "Tet_10", "Triangle_6": "Tri_6"}  # of dolfinx, and of VTK
-LAGRANGE = {69: {3: 5, 6: 22}, 71: {4: 10, 10: 24}}  # triangles and tetrahedra by nodes
 SOLID = 3  # dimension
-VOXEL, BRICK = 11, [0, 1, 3, 2, 4, 5, 7, 6]  # corners of a voxel in the order of a hexahedron
 
 
 def read_file(path: Path) -> Contents:
@@ -133,11 +125,17 @@ def _read_vtk(path: Path) -> Any:
     solid = [name for name in names if name not in shared]
     notes, first = [f"read {len(parts)} parts"] * (len(parts) > 1), 0
     blocks: list[tuple[str, np.ndarray, dict[str, np.ndarray]]] = []
+    vtk_cells = {
+        1: "vertex", 3: "line", 5: "triangle", 9: "quad", 10: "tetra", 11: "hexahedron",
+        12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8",
+        24: "tetra10",
+    }  # fmt: skip
+    voxel, brick = 11, [0, 1, 3, 2, 4, 5, 7, 6]  # corners of a voxel in the order of a hexahedron
     for part, grid in parts:
         has_tags = part not in shared and grid.n_cells in tagged  # in another grid
         for kind in [] if has_tags else np.unique(grid.celltypes).tolist():
             own, name = grid.celltypes == kind, kinds[kind].name.lower().replace("_", " ")
-            if kind not in VTK_CELLS and kind not in solids:
+            if kind not in vtk_cells and kind not in solids:
                 notes.append(f"left out {own.sum():,} cells of type {name}")
                 continue
             arrays = {name: np.asarray(grid.cell_data[name])[own] for name in grid.cell_data}
@@ -146,8 +144,8 @@ def _read_vtk(path: Path) -> Any:
             elif len(solid) > 1 and part in solid:
                 arrays.setdefault("region", np.full(own.sum(), solid.index(part) + 1))
             nodes = np.asarray(grid.cells_dict[kind]) + first
-            nodes = nodes[:, BRICK] if kind == VOXEL else nodes
-            blocks.append((VTK_CELLS.get(kind, name), nodes, arrays))
+            nodes = nodes[:, brick] if kind == voxel else nodes
+            blocks.append((vtk_cells.get(kind, name), nodes, arrays))
         first += grid.n_points
     flat = (name for _, _, arrays in blocks for name, x in arrays.items() if x.dtype.kind in "biuf")
     return meshio.Mesh(
@@ -182,9 +180,10 @@ def _read_xdmf(path: Path) -> tuple[Any, dict[str, bool]]:
                 if step < 2:  # VTK reads the first of a collection
                     names = (each.get("Name", "") for each in (outer, grid))
                     shared |= dict.fromkeys(names, len(parts) == 1)
+    xdmf_kinds = {"Tetrahedron_10": "Tet_10", "Triangle_6": "Tri_6"}  # of dolfinx, and of VTK
     for cells in root.iter("Topology"):
         kind = cells.get("TopologyType", "")
-        cells.set("TopologyType", XDMF_KINDS.get(kind, kind))
+        cells.set("TopologyType", xdmf_kinds.get(kind, kind))
     for item in root.iter("DataItem"):
         if item.get("Format", "XML").upper() != "XML":  # but HDF or Binary, in another file
             name, colon, inside = (item.text or "").strip().partition(":/")
@@ -222,7 +221,8 @@ def _grid(path: Path, part: Any) -> Any:
         return _labelled(path, part)
     flat = part.triangulate() if isinstance(part, pyvista.PolyData) else part
     grid = flat.cast_to_unstructured_grid()
-    for kind, by_nodes in LAGRANGE.items():
+    lagrange = {69: {3: 5, 6: 22}, 71: {4: 10, 10: 24}}  # triangles and tetrahedra by nodes
+    for kind, by_nodes in lagrange.items():
         own, nodes = grid.celltypes == kind, np.diff(grid.offset)
         for count in np.unique(nodes[own]).tolist():
             grid.celltypes[own & (nodes == count)] = by_nodes.get(count, kind)

@@ -22,7 +22,6 @@ from meshes.tetmesh import MeshError
 from meshes.typing import Floats
 
 LevelSet = tuple[Floats, Floats]  # values (n,) and gradients (n, 3)
-PADS = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: x of the finger roots
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,10 +107,11 @@ def _field(palm: Palm, points: Floats) -> LevelSet:
 def _mounds(palm: Palm) -> Iterator[tuple[float, Floats, Floats]]:
     """Height, centre and semi-axes of each mound."""
     b, length, half = palm.breadth, palm.length, palm.thickness / 2
+    pads = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: x of the finger roots
     places = [
         (palm.thenar_height, 0.25 * b, -0.21 * length, 0.22 * b, 0.29 * length),
         (palm.hypothenar_height, -0.27 * b, -0.16 * length, 0.19 * b, 0.31 * length),
-        *((palm.pad_height, x * b, 0.37 * length, 0.12 * b, 0.12 * length) for x in PADS),
+        *((palm.pad_height, x * b, 0.37 * length, 0.12 * b, 0.12 * length) for x in pads),
     ]
     for height, x, y, across, along in places:
         if height > 0:

@@ -27,8 +27,6 @@ from meshes.tetmesh import (
 )
 from meshes.typing import Floats, Ints
 
-SECTORS = 8  # of a disc: no element crosses x = 0 or y = 0
-CLOSEST = 0.4  # of a cell: a plane replaces grid lines nearer than this
 MOST_UNKNOWNS = 3_000_000  # degrees of freedom whose factorisation fits in a workstation
 
 Lines = tuple[Floats, Floats, Floats]  # m, increasing, along x, y and z
@@ -172,15 +170,16 @@ def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = 
 
 def _rings(rings: int) -> tuple[Floats, Ints]:
     """Points (n, 2) of a unit disc, 8 k on ring k, and triangles (8 r^2, 3)."""
-    start = np.cumsum([0, 1, *(SECTORS * np.arange(1, rings))])
+    sectors = 8  # of a disc: no element crosses x = 0 or y = 0
+    start = np.cumsum([0, 1, *(sectors * np.arange(1, rings))])
     points, triangles = [np.zeros((1, 2))], []
     for k in range(1, rings + 1):
-        angle = 2 * np.pi * np.arange(SECTORS * k) / (SECTORS * k)
+        angle = 2 * np.pi * np.arange(sectors * k) / (sectors * k)
         points.append(k / rings * np.column_stack([np.cos(angle), np.sin(angle)]))
-        sector, i = np.divmod(np.arange(SECTORS * k), k)
-        outer = start[k] + np.arange(SECTORS * k)
-        following = start[k] + np.arange(1, SECTORS * k + 1) % (SECTORS * k)
-        around = max(1, SECTORS * (k - 1))
+        sector, i = np.divmod(np.arange(sectors * k), k)
+        outer = start[k] + np.arange(sectors * k)
+        following = start[k] + np.arange(1, sectors * k + 1) % (sectors * k)
+        around = max(1, sectors * (k - 1))
         inner = start[k - 1] + (sector * (k - 1) + i) % around
         triangles.append(np.column_stack([outer, following, inner]))
         between = i < k - 1
@@ -217,9 +216,10 @@ def with_planes(line: Floats, planes: Iterable[float]) -> Floats:
     """Return grid lines with additional ones at given places, without lines too close to these."""
     places = np.array(sorted(planes))
     inner = line[1:-1]
+    closest = 0.4  # of a cell: a plane replaces grid lines nearer than this
     if len(places) and len(inner):
         cell = np.minimum(np.diff(line)[:-1], np.diff(line)[1:])
-        inner = inner[np.abs(inner[:, None] - places).min(axis=1) > CLOSEST * cell]
+        inner = inner[np.abs(inner[:, None] - places).min(axis=1) > closest * cell]
     return np.unique(np.concatenate([line[:1], inner, places, line[-1:]]))
 
 

@@ -18,8 +18,6 @@ ROTATIONS = {  # each about one axis; the rows are the new x, y and z
     "+x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
     "-x": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
 }
-INSIDE, LEVEL = 3e-3, 1e-4  # m: smallest distance from the outline, largest from the top
-OUTLINE_CELLS = 200  # along the longer side of the raster of the outline
 
 
 def rotation_to_z(up: str) -> Floats:
@@ -46,10 +44,11 @@ def shift_to_origin(surface: Surface) -> Floats:
     low, cell, depth = _outline(surface)
     i, j = np.floor(-low / cell + 1).astype(int)
     in_raster = 0 <= i < depth.shape[0] and 0 <= j < depth.shape[1]
-    if in_raster and depth[i, j] * cell >= min(INSIDE, radius / 2):
+    inside, level = 3e-3, 1e-4  # m: smallest distance from the outline, largest from the top
+    if in_raster and depth[i, j] * cell >= min(inside, radius / 2):
         x = y = 0.0
     height = height_at(surface, x, y)
-    shift = -np.array([x, y, height if abs(height) > LEVEL else 0.0])
+    shift = -np.array([x, y, height if abs(height) > level else 0.0])
     return shift + 0.0
 
 
@@ -68,7 +67,8 @@ def _outline(surface: Surface) -> tuple[Floats, float, Floats]:
     from scipy.ndimage import distance_transform_edt
 
     flat = surface.points[:, :2]
-    low, cell = flat.min(axis=0), np.ptp(flat, axis=0).max() / OUTLINE_CELLS
+    outline_cells = 200  # along the longer side of the raster of the outline
+    low, cell = flat.min(axis=0), np.ptp(flat, axis=0).max() / outline_cells
     shape = np.ceil(np.ptp(flat, axis=0) / cell).astype(int) + 3
     inside = np.zeros(shape, bool)
     corners = flat[surface.triangles]

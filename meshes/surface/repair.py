@@ -22,10 +22,6 @@ from meshes.surface.triangulation import (
 from meshes.tetmesh import MeshError
 from meshes.typing import Floats, Ints
 
-MOST_OFF_PLANE = 0.1  # of the width of a hole: how far its edge may leave a plane to be capped
-SEAM = 0.3  # of the length of open edges: sides of a seam are closer to each other
-SAME_POINT = 1e-6  # of the diagonal: points nearer to each other than this are merged
-
 
 def check(surface: Surface) -> None:
     """Refuse a surface that is not one closed outward-facing manifold without intersections."""
@@ -156,11 +152,12 @@ def _with_caps(surface: Surface, notes: list[str]) -> Surface:
         notes.append("no hole to close")
         return surface
     label = connected_components(len(surface.points), ends)
+    most_off_plane = 0.1  # of the width of a hole: how far its edge may leave a plane to be capped
     for hole in np.unique(label[ends]):
         rim = surface.points[np.flatnonzero(label == hole)]
         rim = rim - rim.mean(axis=0)
         widths = np.ptp(rim @ np.linalg.svd(rim, full_matrices=False)[2].T, axis=0)
-        if widths[2] > MOST_OFF_PLANE * widths[0]:
+        if widths[2] > most_off_plane * widths[0]:
             place = in_mm(surface.points[label == hole][0])
             raise MeshError(
                 f"a hole {1e3 * widths[0]:.0f} mm wide near {place} cannot be capped, because its "
@@ -183,7 +180,8 @@ def first_coincident(points: Floats, distance: float | None = None) -> Ints:
     """
     from scipy.spatial import cKDTree
 
-    same = SAME_POINT * float(np.linalg.norm(np.ptp(points, axis=0)))
+    same_point = 1e-6  # of the diagonal: points nearer to each other than this are merged
+    same = same_point * float(np.linalg.norm(np.ptp(points, axis=0)))
     near = cKDTree(points).query_pairs(distance or same, output_type="ndarray")
     label = connected_components(len(points), near)
     _, first = np.unique(label, return_index=True)
@@ -224,10 +222,11 @@ def _paired_edges(surface: Surface) -> Ints:
     sides = np.sort(_edges(surface.triangles), axis=1)
     keys = sides[:, 0] * len(surface.points) + sides[:, 1]
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
+    seam = 0.3  # of the length of open edges: sides of a seam are closer to each other
     if (open_edges := first[count == 1]).size:
         cure = "close plane holes, such as a wrist, with --cap, and other holes in the program"
         width, share = _gap(surface.points, sides[open_edges])
-        if share < SEAM:
+        if share < seam:
             cure = (
                 f"this is a seam about {1e6 * width:.3g} um wide, so merge its sides in the program"
             )

@@ -10,17 +10,16 @@ from meshes.surface.triangulation import Surface
 from meshes.typing import Floats, Ints
 
 ROUND_OFF = 1e-9  # of the size of both triangles: points nearer to a plane lie on it
-MOST_CELLS = 400_000  # entries of large triangles in the grid, before its cells grow
-CHUNK = 200_000  # pairs tested at once
 
 
 def self_intersections(surface: Surface) -> Ints:
     """Return the pairs (m, 2) of triangles that touch elsewhere than at shared corners."""
     corners = surface.points[surface.triangles] - surface.points.mean(axis=0)
     pairs = _candidates(corners)
+    pairs_at_once = 200_000  # pairs tested at once
     crossing = [
         chunk[_cross(corners, surface.triangles, chunk)]
-        for chunk in np.array_split(pairs, max(1, len(pairs) // CHUNK))
+        for chunk in np.array_split(pairs, max(1, len(pairs) // pairs_at_once))
     ]
     return np.vstack(crossing)
 
@@ -30,10 +29,11 @@ def _candidates(corners: Floats) -> Ints:
     low, high = corners.min(axis=1), corners.max(axis=1)
     cell = np.maximum(np.median((high - low).max(axis=1)) * 1.5, 1e-300)
     origin = low.min(axis=0)
+    most_cells = 400_000  # entries of large triangles in the grid, before its cells grow
     while True:
         first = ((low - origin) / cell).astype(np.int64)
         span = ((high - origin) / cell).astype(np.int64) - first + 1
-        if span.prod(axis=1).sum() <= 20 * len(corners) + MOST_CELLS:
+        if span.prod(axis=1).sum() <= 20 * len(corners) + most_cells:
             break
         cell *= 2
     count = span.prod(axis=1)

@@ -10,8 +10,6 @@ from meshes.surface.triangulation import Surface
 from meshes.tetmesh import MeshError
 from meshes.typing import Floats
 
-CHUNK = 2_000_000  # pairs of points and triangles computed at once
-
 
 def winding_number(surface: Surface, points: Floats) -> Floats:
     """Return the winding number (n,) of a closed surface about points (n, 3): 1 inside, 0 outside.
@@ -22,7 +20,8 @@ def winding_number(surface: Surface, points: Floats) -> Floats:
     near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
     winding = np.zeros(len(points))
     corners = surface.points[surface.triangles]
-    for some in np.array_split(near, max(1, len(near) * len(corners) // CHUNK)):
+    chunk = 2_000_000  # pairs of points and triangles computed at once
+    for some in np.array_split(near, max(1, len(near) * len(corners) // chunk)):
         winding[some] = _solid_angles(corners, points[some]) / (4 * np.pi)
     return winding
 

@@ -15,7 +15,6 @@ from meshes.volume.quality import edge_lengths, jacobian_ratios, restore_bad
 log = logging.getLogger(__name__)
 
 LEAST_RATIO = 0.3  # of det J to that of the straight element; below, edges stay straight
-FURTHEST = 0.5  # of the mean edge at a node: nodes further from the level set stay
 
 Function = Callable[[Floats], Floats]
 
@@ -42,7 +41,8 @@ def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> Te
         )
     facets = boundary_facets(mesh.tets)
     corners, middles = np.unique(facets[:, :3]), np.unique(facets[:, 3:])
-    reach = FURTHEST * _mean_edge(mesh)
+    furthest = 0.5  # of the mean edge at a node: nodes further from the level set stay
+    reach = furthest * _mean_edge(mesh)
 
     def target(points: Floats, nodes: Ints) -> Floats:
         """Positions of nodes on the level set, unchanged if it is too far away."""

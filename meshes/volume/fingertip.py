@@ -19,9 +19,7 @@ from meshes.typing import Floats, Ints
 from meshes.volume.curving import LEAST_RATIO, keep_jacobians
 from meshes.volume.quality import jacobian_ratios
 
-TISSUE, BONE = 0, 1  # regions
-EASING_STEPS, EASING = 6, 0.7  # reductions of the curvature of distorted elements
-FEWEST_SHELLS, FEWEST_BONE_SHELLS = 3, 2
+BONE = 1  # regions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +76,8 @@ class Fingertip:
 
 def shell_count(shape: Fingertip, h: float) -> int:
     """Return the number of shells of a mesh with cells of size h in m at the skin."""
-    return max(FEWEST_SHELLS, round_up(quarter_circumference(shape) / h))
+    fewest_shells = 3
+    return max(fewest_shells, round_up(quarter_circumference(shape) / h))
 
 
 def quarter_circumference(shape: Fingertip) -> float:
@@ -104,13 +103,15 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
     if not 0 < h < np.inf:
         raise MeshError(f"h = {h} m must be finite and above 0")
     shells = shell_count(shape, h)
-    bone = max(FEWEST_BONE_SHELLS, shells - max(1, round(shape.cover / h)))
+    fewest_bone_shells = 2
+    bone = max(fewest_bone_shells, shells - max(1, round(shape.cover / h)))
     layers = max(1, round_up((shape.length - shape.breadth / 2) / h))
     check_size((2 * shells, 2 * shells, layers + shells), order=2)
     lattice, tets = _lattice(shells, layers)
     points = _map_lattice(shape, lattice, (bone, shells), layers)
-    region = np.where(_shell_of(lattice)[tets].max(axis=1) <= bone, BONE, TISSUE)
-    names = {TISSUE: "tissue", BONE: "bone"}
+    tissue = 0  # regions
+    region = np.where(_shell_of(lattice)[tets].max(axis=1) <= bone, BONE, tissue)
+    names = {tissue: "tissue", BONE: "bone"}
     mesh = quadratic(TetMesh(points=points, tets=tets, region=region, region_names=names))
     edges = np.moveaxis(mesh.tets[:, EDGES], 2, 0)
     curved = np.array(mesh.points)
@@ -126,9 +127,10 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
 def _reduce_curvature(mesh: TetMesh, curved: Floats) -> Floats:
     """Curved nodes (n, 3), less so where elements would be distorted, as in a coarse bone."""
     share, change = np.ones((len(curved), 1)), curved - mesh.points
-    for _ in range(EASING_STEPS):
+    easing_steps, easing = 6, 0.7  # reductions of the curvature of distorted elements
+    for _ in range(easing_steps):
         bad = jacobian_ratios(mesh.points + share * change, mesh.tets) < LEAST_RATIO
-        share[np.unique(mesh.tets[bad, 4:])] *= EASING
+        share[np.unique(mesh.tets[bad, 4:])] *= easing
     return keep_jacobians(mesh.tets, mesh.points, mesh.points + share * change)[0]
 
 

@@ -22,12 +22,6 @@ from meshes.volume.curving import curve_boundary
 from meshes.volume.quality import angles_between_faces
 from meshes.volume.tetrahedralise import SHARPEST
 
-INWARDS = 2.0  # power of the distance from the middle with which corner radii grow outwards
-RIM = 2.0  # width of the zone whose boxes follow the rim, over half the thickness
-LEAST_COSINE = 0.3  # between the normals of a palm with and without mounds
-STEPS = 8  # of Newton's method, enough for mounds as high as the palm is thick
-OFF = 1e-3  # of the thickness: largest distance of a boundary node from the level set
-
 
 def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     """Return ten-node tetrahedra of a palm whose boundary nodes lie on its level set.
@@ -51,7 +45,8 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     inverted = corner_volumes(points, tets).min() <= 0
     sharpest = 0.0 if inverted else float(angles_between_faces(points, tets).min())
     off = np.abs(level_set(palm, points[_on_boundary(cells).ravel()])).max()
-    if sharpest < SHARPEST or off > OFF * palm.thickness:
+    farthest = 1e-3  # of the thickness: largest distance of a boundary node from the level set
+    if sharpest < SHARPEST or off > farthest * palm.thickness:
         raise MeshError(
             "this palm cannot be meshed, because its relief is too steep: the smallest angle "
             f"between faces is {sharpest:.2g} degrees, and the surface is missed by "
@@ -96,7 +91,8 @@ def _wrap(palm: Palm, box: Floats) -> Floats:
     across, middle = palm.thickness / 2, box[..., 2] + palm.thickness / 2
     # Concentric rectangle through each point: 0 in the middle, 1 at the outline.
     level = np.abs(box[..., :2] / half).max(axis=-1)
-    width = min(half.min(), RIM * across)
+    rim = 2.0  # width of the zone whose boxes follow the rim, over half the thickness
+    width = min(half.min(), rim * across)
     beyond = width - (1 - level) * half.min()  # the inner edge of the rim
     inner, height = _round_corners(np.maximum(beyond, 0), middle, (width, across), palm.edge_radius)
     in_rim = beyond > 0
@@ -116,7 +112,8 @@ def _round_corners(
     a, b = half
     level = np.maximum(np.maximum(np.abs(x) / a, np.abs(y) / b), 1e-300)
     on_x = np.abs(x) / a >= np.abs(y) / b  # on a side of constant x
-    r = radius * level**INWARDS
+    inwards = 2.0  # power of the distance from the middle with which corner radii grow outwards
+    r = radius * level**inwards
     side = level * np.where(on_x, b, a)
     straight = side - r
     way = np.abs(np.where(on_x, y, x)) / side * (straight + np.pi / 4 * r)
@@ -136,9 +133,11 @@ def _onto_level_set(palm: Palm, grid: Floats) -> Floats:
     # Along the normals of the mounds, nodes would gather in the dips between them.
     smooth = replace(palm, thenar_height=0.0, hypothenar_height=0.0, pad_height=0.0)
     points, normals = grid[outer], gradient(smooth, grid[outer])
-    for _ in range(STEPS):
+    least_cosine = 0.3  # between the normals of a palm with and without mounds
+    steps = 8  # of Newton's method, enough for mounds as high as the palm is thick
+    for _ in range(steps):
         steepness = np.einsum("ni,ni->n", gradient(palm, points), normals)
-        step = level_set(palm, points) / np.maximum(steepness, LEAST_COSINE)
+        step = level_set(palm, points) / np.maximum(steepness, least_cosine)
         points = points - step[:, None] * normals
     moved[outer] = points - grid[outer]
     return grid + _transfinite(moved)

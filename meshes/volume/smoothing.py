@@ -16,10 +16,6 @@ from meshes.volume.quality import angles_between_faces, restore_bad
 
 Sizing = Callable[[Floats], Floats]
 
-STEPS, SHARE = 12, 0.7  # steps, and the share of the way to the mean in each
-# Trial moves of a node of a sharp element: distances over the edges around it, and directions.
-TRIAL_STEPS = np.array([0.2, 0.1, 0.05, 0.025] * 2)
-DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
 GOOD = 25.0  # degrees: smallest angles may neither decrease below it, nor fall below it
 
 
@@ -33,10 +29,11 @@ def smooth(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
     points, tets = np.array(mesh.points), mesh.tets
     outer = np.zeros(len(points), bool)
     outer[boundary_facets(tets)] = outer[interface_facets(mesh)] = True
-    for _ in range(STEPS):
+    steps, share = 12, 0.7  # steps, and the share of the way to the mean in each
+    for _ in range(steps):
         moved = _means(points, tets, sizing)
         moved[outer] = points[outer]
-        points = _without_losses(tets, points, points + SHARE * (moved - points))
+        points = _without_losses(tets, points, points + share * (moved - points))
     for node in np.unique(tets[_least_angles(points, tets) < GOOD]):
         if not outer[node]:
             _widen(points, tets[(tets == node).any(axis=1)], node)
@@ -47,8 +44,11 @@ def _widen(points: Floats, patch: Ints, node: int) -> None:
     """Move a node by trial to where the smallest angle of its elements is largest."""
     best = _least_angles(points, patch).min()
     length = np.linalg.norm(np.ptp(points[patch], axis=1), axis=1).mean()
-    for reach in length * TRIAL_STEPS:
-        for place in points[node] + reach * DIRECTIONS:
+    # Trial moves of a node of a sharp element: distances over the edges around it, and directions.
+    trial_steps = np.array([0.2, 0.1, 0.05, 0.025] * 2)
+    directions = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
+    for reach in length * trial_steps:
+        for place in points[node] + reach * directions:
             before = points[node].copy()
             points[node] = place
             least = _least_angles(points, patch).min()

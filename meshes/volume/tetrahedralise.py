@@ -30,14 +30,8 @@ log = logging.getLogger(__name__)
 
 EPSILON = 0.05  # of h: largest distance of the mesh from the surface, its envelope
 SMALLEST_EPSILON = 1e-4  # of the diagonal: below it, the mesher takes minutes to hours
-MOST_OF_INNER = 0.025  # of the thickness of an inner surface, whose volume may change by 2 %
-MOST_OF_THICKNESS = 0.1  # of the thickness of the body, which a larger envelope would swallow
-MOST_TETRAHEDRA = 1_000_000
 SHARPEST = 5.0  # degrees: least acceptable dihedral angle
-VOLUME_ERROR, INNER_VOLUME_ERROR = 0.005, 0.02  # relative to the volumes within surfaces
-LOST_SHELL = 0.3  # of the volume between surface and envelope that straight facets may cut off
 REST = "tissue"  # name of the region outside inner surfaces
-GRID_CELLS = 32  # along the longest side of the background grid of sizes
 
 
 def tetrahedralise(
@@ -70,9 +64,10 @@ def tetrahedralise(
     check(surface)
     check_size(surface, "h", h)
     epsilon = _envelope(surface, h)
+    most_of_inner = 0.025  # of the thickness of an inner surface, whose volume may change by 2 %
     if inner:
         epsilon = max(
-            min(epsilon, *(MOST_OF_INNER * thinnest(s) for s in inner.values())),
+            min(epsilon, *(most_of_inner * thinnest(s) for s in inner.values())),
             SMALLEST_EPSILON * surface.diagonal,
         )
     if not 0 < timeout < np.inf:
@@ -112,11 +107,12 @@ def graded(h: float, grading: Grading) -> Sizing:
 def _envelope(surface: Surface, h: float) -> float:
     """Largest distance in m of a mesh from a surface; smaller ones take longer if it is curved."""
     thickness, diagonal = thinnest(surface), surface.diagonal
-    most, least = MOST_OF_THICKNESS * thickness, SMALLEST_EPSILON * diagonal
+    most_of_thickness = 0.1  # of the thickness of the body, which a larger envelope would swallow
+    most, least = most_of_thickness * thickness, SMALLEST_EPSILON * diagonal
     if most < least:
         raise MeshError(
             f"the body is {1e3 * thickness:.3g} mm thick and {1e3 * diagonal:.3g} mm long, too "
-            f"thin for the mesher, whose limit is 1:{MOST_OF_THICKNESS / SMALLEST_EPSILON:g}; "
+            f"thin for the mesher, whose limit is 1:{most_of_thickness / SMALLEST_EPSILON:g}; "
             "use `meshes.sheet` or `meshes.block`"
         )
     return min(max(EPSILON * h, least), most)
@@ -133,7 +129,8 @@ def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, n
     """Background mesh around the body, with the target edge length (n,) at each point."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     pad = 0.05 * (high - low).max()
-    cells = np.maximum(2, np.ceil(GRID_CELLS * (high - low) / (high - low).max())).astype(int)
+    grid_cells = 32  # along the longest side of the background grid of sizes
+    cells = np.maximum(2, np.ceil(grid_cells * (high - low) / (high - low).max())).astype(int)
     cells = cells if sizing else np.full(3, 2)
     lines = [np.linspace(a - pad, b + pad, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
     grid = extrude(*lines, order=1)
@@ -148,10 +145,11 @@ def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, n
         sizes = np.minimum(sizes, (high - low).max())
     expected = (corner_volumes(grid.points, grid.tets) / sizes[grid.tets].mean(axis=1) ** 3).sum()
     expected *= 8.5 * volume(surface) / np.prod(high - low + 2 * pad)
-    if expected > MOST_TETRAHEDRA:
+    most_tetrahedra = 1_000_000
+    if expected > most_tetrahedra:
         raise MeshError(
             f"the mesh would have at least {expected:.2g} tetrahedra, more than the limit of "
-            f"{MOST_TETRAHEDRA:,}; use larger elements"
+            f"{most_tetrahedra:,}; use larger elements"
         )
     return {"grid_points": grid.points, "grid_tets": grid.tets, "grid_sizes": sizes}
 
@@ -199,15 +197,16 @@ def _with_regions(mesh: TetMesh, inner: Mapping[str, Surface]) -> TetMesh:
     middles = mesh.points[mesh.tets].mean(axis=1)
     region = np.zeros(len(mesh.tets), np.int64)
     volumes, enclosed = corner_volumes(mesh.points, mesh.tets), [volume(s) for s in inner.values()]
+    inner_volume_error = 0.02  # relative to the volumes within surfaces
     for k in np.argsort(enclosed)[::-1].tolist():
         name, surface = list(inner.items())[k]
         inside = winding_number(surface, middles) > 0.5
         region[inside] = k + 1
         ratio = volumes[inside].sum() / enclosed[k]
-        if not abs(ratio - 1) <= INNER_VOLUME_ERROR:
+        if not abs(ratio - 1) <= inner_volume_error:
             raise MeshError(
                 f"the region {name} has {100 * ratio:.3g} % of the volume within its surface, a "
-                f"difference above {100 * INNER_VOLUME_ERROR:g} %; use smaller elements"
+                f"difference above {100 * inner_volume_error:g} %; use smaller elements"
             )
     return replace(mesh, region=region, region_names=dict(enumerate([REST, *inner])))
 
@@ -226,7 +225,9 @@ def _checked_result(surface: Surface, epsilon: float, points: Floats, tets: np.n
         )
     enclosed = volume(surface)
     ratio = corner_volumes(mesh.points, mesh.tets).sum() / enclosed
-    limit = VOLUME_ERROR + LOST_SHELL * epsilon * area(surface) / enclosed
+    volume_error = 0.005  # relative to the volumes within surfaces
+    lost_shell = 0.3  # of the volume between surface and envelope that straight facets may cut off
+    limit = volume_error + lost_shell * epsilon * area(surface) / enclosed
     if not abs(ratio - 1) <= limit:
         raise MeshError(
             f"the mesh has {100 * ratio:.2f} % of the volume within the surface, a difference "
