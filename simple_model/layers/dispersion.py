@@ -21,14 +21,8 @@ from simple_model.layers.stack import Stack
 from simple_model.layers.thin_layers import eigenpairs, outgoing, pencil
 from simple_model.typing import Bools, Complex, Floats
 
-SHEET_MODES = ("bending wave", "bending near field")
 KINDS = ("propagating", "backward", "leaky", "evanescent")
 MOST = 6  # modes
-ROUNDS = 4  # of further frequencies between the given ones
-CANDIDATES = 3  # roots that are tracked per returned mode
-FASTEST_DECAY = 2 / np.pi  # |Im k| / |Re k| of a wave that falls to 1/e in a quarter of its length
-SLOWEST_FLUX = 0.05  # of the phase speed: energy that moves slower does not leave
-DIFFERENCE = 1e-4  # of a frequency, step of the derivative of a modulus
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -166,9 +160,11 @@ def dispersion_curves(
     if stack.is_half_space and len(stack.materials) == 1:
         roots, depths = rayleigh_mode(stack.materials[0], omega)
         return curves(f, depths, roots, ("Rayleigh wave",))
-    most_roots = CANDIDATES * most
+    candidates = 3  # roots that are tracked per returned mode
+    most_roots = candidates * most
     fine, (roots, depths) = omega, _roots(stack, omega, most_roots)
-    for _ in range(ROUNDS):
+    rounds = 4  # of further frequencies between the given ones
+    for _ in range(rounds):
         is_bound = np.abs(roots.wavenumbers.real) > _leaking(stack, fine)[:, None]
         is_wave = is_bound & ~_is_evanescent(roots.wavenumbers)
         further = frequencies_between(roots, fine, is_wave, most)
@@ -198,7 +194,9 @@ def _roots(stack: Stack, omega: Floats, most: int) -> tuple[Roots, Floats]:
 
 
 def _is_evanescent(wavenumbers: Complex) -> Bools:
-    return np.asarray(np.abs(wavenumbers.imag) > FASTEST_DECAY * np.abs(wavenumbers.real))
+    # |Im k| / |Re k| of a wave that falls to 1/e in a quarter of its length.
+    fastest_decay = 2 / np.pi
+    return np.asarray(np.abs(wavenumbers.imag) > fastest_decay * np.abs(wavenumbers.real))
 
 
 def checked_frequencies(frequencies: ArrayLike) -> Floats:
@@ -215,10 +213,11 @@ def checked_frequencies(frequencies: ArrayLike) -> Floats:
 
 def modulus_and_slope(stack: Stack, omega: Floats) -> tuple[Complex, Complex]:
     """Shear moduli (f, l) of the layers in Pa, and their derivatives in Pa s, at (f,) rad/s."""
-    at = omega[:, None] * np.array([1.0, 1 - DIFFERENCE, 1 + DIFFERENCE])
+    difference = 1e-4  # of a frequency, step of the derivative of a modulus
+    at = omega[:, None] * np.array([1.0, 1 - difference, 1 + difference])
     mu = [np.broadcast_to(m.complex_modulus(at), at.shape) for m in stack.materials]
     values = np.stack(mu, axis=1).astype(np.complex128)
-    step = 2 * DIFFERENCE * omega[:, None]
+    step = 2 * difference * omega[:, None]
     return values[..., 0], (values[..., 2] - values[..., 1]) / step
 
 
@@ -278,10 +277,11 @@ def curves(
     """
     k = roots.wavenumbers
     known = np.isfinite(k)
+    slowest_flux = 0.05  # of the phase speed: energy that moves slower does not leave
     with np.errstate(invalid="ignore", divide="ignore"):
         omega = 2 * np.pi * frequencies[:, None]
         decays = _is_evanescent(k)
-        stays = roots.energy_speed < SLOWEST_FLUX * omega / np.abs(k.real)
+        stays = roots.energy_speed < slowest_flux * omega / np.abs(k.real)
         leaks = np.zeros(k.shape, bool) if bound is None else np.abs(k.real) < bound[:, None]
         kinds = np.select(
             [~known, decays | stays, leaks, k.real < 0],
@@ -336,7 +336,8 @@ def sheet_curves(
         residues=2 * k**2 / by_k, energy_speed=np.full(k.shape, np.inf),
         shapes=np.stack([upper, lower], axis=2),
     )  # fmt: skip
-    return curves(f, np.array([0.0, thickness]), roots, SHEET_MODES)
+    sheet_modes = ("bending wave", "bending near field")
+    return curves(f, np.array([0.0, thickness]), roots, sheet_modes)
 
 
 def _bending_wavenumbers(bending: Complex, tension: float, inertia: Floats, air: Floats) -> Complex:

@@ -51,18 +51,11 @@ from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.response import Effort, Response
 from simple_model.typing import Complex, Floats, Ints
 
-PADDING = 2, 256  # samples of the transform for each sample of the record, and more
 WRAP_AROUND = 1e-5  # factor by which the wrap-around is damped
 TRANSFORM_RATE = 20_000.0  # Hz, of the samples of the transform
-BAND_END = 3.0  # steepness of the error function that ends the band
-ABRUPT_PARTS = 2  # samples of a load that jumps, or turns, per sample of the transform
-LOAD_END = 6.0  # steepness of the error function that ends a load after the record
-FEW_DISTANCES = 40  # largest number that is computed without splines
 AT_ONCE = 2**22  # values transformed at a time, about 100 MB
 STEPS_PER_WIDTH = 6  # distances of a spline per standard deviation of the focal spot
-SHARED_STEPS = 8  # the steps of a spline are a multiple, so that loads share their integrals
 SAMPLE_OFFSETS = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # without symmetry
-NEGLIGIBLE = 1e-4  # of the largest response, where the frequencies of a transient end
 
 Splines = Callable[[Floats], Floats]
 NORMAL = normal_field(Compliance(lambda k, w: 0 * k))  # its weights suit every body
@@ -240,25 +233,29 @@ def field_history(
     w = _transform_frequencies(padded, dt)
     damping = -w[0].imag
     folded = is_folded(pressure, times)
+    band_end = 3.0  # steepness of the error function that ends the band
     if not folded and oversampling(highest_line(pressure), step(times)) > 1:
         passed = below_half_the_rate(w.real / (2 * np.pi), times).astype(float)
     else:  # a spectrum that ended at once would ring after the start of an acceleration
-        passed = erfc(BAND_END * (4 * w.real * dt / np.pi - 3)) / 2
+        passed = erfc(band_end * (4 * w.real * dt / np.pi - 3)) / 2
+
+    load_end = 6.0  # steepness of the error function that ends a load after the record
 
     def lasting(t: Floats) -> Floats:
         """Factor of the load at times (t,) in s, with the damping of the transform."""
         after = (t - n * dt) / ((padded - n) * dt)
-        ended = erfc(LOAD_END * (2 * after - 1)) / 2
+        ended = erfc(load_end * (2 * after - 1)) / 2
         return np.asarray(np.where(t < 0, 0.0, ended * np.exp(-damping * t)))
 
     jumps = jump_times(pressure, 0.0, padded * dt)
     parts = oversampling(highest_line(pressure), dt)
+    abrupt_parts = 2  # samples of a load that jumps, or turns, per sample of the transform
     if folded:
         knots, of_load = _low_passed_load(pressure, 0.5 / step(times), padded, dt, lasting)
         parts = 1
     else:
         turns = len(pressure.tacton.trajectory.parts[1]) > 1
-        parts = max(parts, ABRUPT_PARTS if len(jumps) or turns else 1)
+        parts = max(parts, abrupt_parts if len(jumps) or turns else 1)
         knots, of_load = _sampled_load(pressure, jumps, padded, dt, parts, lasting)
     table, splines = _interpolation(probes, knots, width)
     g = _transient(field, tuple(table.tolist()), padded, dt, width)
@@ -290,7 +287,8 @@ def _transient(
     loads of a sweep share them.
     """
     w = _transform_frequencies(padded, dt)
-    g = point_integrals(field, np.array(distances), w, width, negligible=NEGLIGIBLE)
+    negligible = 1e-4  # of the largest response, where the frequencies of a transient end
+    g = point_integrals(field, np.array(distances), w, width, negligible=negligible)
     g.flags.writeable = False
     return g
 
@@ -298,8 +296,9 @@ def _transient(
 def transform_samples(times: Floats) -> tuple[int, int]:
     """Samples of the transform from one of the times (t,) in s to the next, and in all."""
     within = max(1, int(np.ceil(step(times) * TRANSFORM_RATE - 1e-6)))
+    padding = 2, 256  # samples of the transform for each sample of the record, and more
     return within, next_fast_len(
-        PADDING[0] * ((len(times) - 1) * within + 1) + PADDING[1], real=True
+        padding[0] * ((len(times) - 1) * within + 1) + padding[1], real=True
     )
 
 
@@ -358,7 +357,8 @@ def _width(pressure: MovingPressure) -> float:
 
 def spline_steps(furthest: float) -> int:
     """Number of distances of a spline up to a distance in standard deviations of the focal spot."""
-    return SHARED_STEPS * max(1, int(np.ceil(furthest * STEPS_PER_WIDTH / SHARED_STEPS))) + 1
+    shared_steps = 8  # the steps of a spline are a multiple, so that loads share their integrals
+    return shared_steps * max(1, int(np.ceil(furthest * STEPS_PER_WIDTH / shared_steps))) + 1
 
 
 def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
@@ -366,7 +366,8 @@ def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats,
     (..., j) that interpolate between them: cubic splines, flat at 0; few distances are used
     directly.
     """
-    if len(knots) * len(probes) <= FEW_DISTANCES:
+    few_distances = 40  # largest number that is computed without splines
+    if len(knots) * len(probes) <= few_distances:
         unique = np.unique(np.linalg.norm(probes[:, None] - knots, axis=-1))
         return unique, lambda r: (r[..., None] == unique).astype(float)
     from scipy.interpolate import CubicSpline  # slow to import

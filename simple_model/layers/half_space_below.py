@@ -21,15 +21,7 @@ from simple_model.layers.stack import Stack
 from simple_model.layers.thin_layers import MATCHED, Pencil, eigenpairs, outgoing, pencil
 from simple_model.typing import Complex, Floats
 
-STEPS, CLOSE = 10, 1e-11  # of inverse iteration; relative change at which it ends
-BESIDE = 1 + 1e-9 * (1 + 1j)  # factor of a root, where the matrix is not singular
-CONVERGED = 1e-6  # last relative change of a root; round-off near nu = 0.5 is 1e-7
-FARTHEST_MOVE = 0.05  # of the shear wavenumber below: a root that moves further is no mode
-SAME_ROOT = 1e-6  # of the shear wavenumber below: closer roots are one
 EPS = 1e-5  # relative step of derivatives of the stiffness of the half-space
-LEAST_BOUND = 0.99  # of the shear wavenumber below: larger wavenumbers are bound
-LARGEST_BOUND = 1.5  # of the largest shear wavenumber: no guided wave is slower
-MOST_GROWTH = 50.0  # exponent of a wave that grows with depth
 DEPTHS = 40  # of a shape in a half-space
 
 
@@ -81,8 +73,11 @@ def modes_above_half_space(
     start = np.concatenate([rayleigh, start], axis=1)
     x = np.concatenate([np.ones_like(x[:, :1]), x], axis=1)
     k, x, last = _refine(terms, omega, start, x, impedance)
-    genuine = (np.abs(k - start) < FARTHEST_MOVE * np.abs(ks)) & (last < CONVERGED)
-    genuine &= ~_is_repeated(k**2, genuine, SAME_ROOT * np.abs(ks) ** 2)
+    converged = 1e-6  # last relative change of a root; round-off near nu = 0.5 is 1e-7
+    farthest_move = 0.05  # of the shear wavenumber below: a root that moves further is no mode
+    genuine = (np.abs(k - start) < farthest_move * np.abs(ks)) & (last < converged)
+    same_root = 1e-6  # of the shear wavenumber below: closer roots are one
+    genuine &= ~_is_repeated(k**2, genuine, same_root * np.abs(ks) ** 2)
     ends, up, down = _ends(terms), 1 + EPS, 1 - EPS
     by_k = (impedance(up * k) - impedance(down * k)) / (2 * EPS * k)[..., None, None]
     by_w = (impedance(k, EPS) - impedance(k, -EPS)) / (2 * EPS * w)[..., None, None]
@@ -128,8 +123,10 @@ def _candidates(
     shortest = 2 * np.pi / terms.depths[-1] + np.abs(k).min(axis=1, keepdims=True)
     share = np.where(np.abs(k.imag) < shortest, share, 0.0)
     slowest = omega * np.sqrt(np.abs(terms.M / terms.Aww).max(axis=1))
-    is_bound = (np.abs(k.imag) < k.real / 2) & (k.real > LEAST_BOUND * ks.real)
-    is_bound &= k.real < LARGEST_BOUND * np.maximum(slowest[:, None], np.abs(ks))
+    least_bound = 0.99  # of the shear wavenumber below: larger wavenumbers are bound
+    is_bound = (np.abs(k.imag) < k.real / 2) & (k.real > least_bound * ks.real)
+    largest_bound = 1.5  # of the largest shear wavenumber: no guided wave is slower
+    is_bound &= k.real < largest_bound * np.maximum(slowest[:, None], np.abs(ks))
     share = share + is_bound
     order = np.argsort(-share, axis=1, kind="stable")[:, :most]
     x = np.concatenate([x[:, :n], x[:, len(V[0]) : len(V[0]) + n]], axis=1)
@@ -149,8 +146,10 @@ def _refine(
     """
     ends = np.ix_(_ends(terms), _ends(terms))
     k, last = start, np.ones(start.shape)
-    for _ in range(STEPS):
-        at = BESIDE * k  # where the matrix is not singular
+    steps, close = 10, 1e-11  # of inverse iteration; relative change at which it ends
+    beside = 1 + 1e-9 * (1 + 1j)  # factor of a root, where the matrix is not singular
+    for _ in range(steps):
+        at = beside * k  # where the matrix is not singular
         matrix, slope = _matrix(terms, at, omega), _by_wavenumber(terms, at)
         matrix[..., ends[0], ends[1]] += impedance(at)
         change = (impedance((1 + EPS) * at) - impedance((1 - EPS) * at)) / (2 * EPS)
@@ -164,7 +163,7 @@ def _refine(
         x = np.where(lost[..., None], x, y)
         last = np.where(lost, 1.0, np.abs(new / k - 1))
         k = np.asarray(np.where(lost, k, new), np.complex128)
-        if (last[~lost] < CLOSE).all():
+        if (last[~lost] < close).all():
             break
     return k, x / np.linalg.norm(x, axis=-1, keepdims=True), last
 
@@ -191,9 +190,10 @@ def _shape(k: Complex, p: Complex, s: Complex, waves: Complex, depths: Floats) -
     z = depths[:, None]
     k, p, s = (x[..., None, None] for x in (k, p, s))
     a, b = (waves[..., None, None, axis] for axis in (0, 1))
+    most_growth = 50.0  # exponent of a wave that grows with depth
     # A false or leaky root grows with depth; the limit avoids overflow.
     pressure, shear = (
-        wave * np.exp(np.minimum(-(rate * z).real, MOST_GROWTH) - 1j * (rate * z).imag)
+        wave * np.exp(np.minimum(-(rate * z).real, most_growth) - 1j * (rate * z).imag)
         for wave, rate in ((a, p), (b, s))
     )
     return np.concatenate([-k * pressure + s * shear, -p * pressure + k * shear], axis=-1)

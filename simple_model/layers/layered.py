@@ -31,10 +31,7 @@ from simple_model.layers.stack import Stack
 from simple_model.typing import Complex, Floats
 
 THIN = 0.3  # thickness times wavenumber, below which differences of exponentials lose digits
-SERIES_LIMIT = 0.05  # x below which a series gives tanh x / x, exact to 1e-15
-BACKWARD = 0.5  # of the second resonance of a stack: above it some modes are backward waves
 WEAKEST = 0.1  # of the mean decay: decay of a mode that is mostly in a layer without loss
-ELASTIC_BASE = 0.5  # factor of the clearance above an elastic base
 Transfer = Callable[[Complex, Complex], Complex]
 Pair = tuple[Any, Any]  # horizontal and vertical
 Symmetric = tuple[Any, Any, Any]  # of complex arrays, a, b, c of [[a, b], [b, c]]
@@ -112,9 +109,11 @@ def clearance(stack: Stack, w: Complex) -> float:
         return inf
     total = sum(thickness for _, thickness in finite)
     turns = np.maximum(_resonance(finite, w, _shear) / 9, _resonance(finite, w, _compression))
-    decay = _decay(stack, w)[turns > (BACKWARD * np.pi / 2) ** 2 / 2]
+    backward = 0.5  # of the second resonance of a stack: above it some modes are backward waves
+    decay = _decay(stack, w)[turns > (backward * np.pi / 2) ** 2 / 2]
     lowest = 1 / total if stack.is_rigid else min(1 / total, _bending(stack, w))
-    lowest *= ELASTIC_BASE if stack.base_stiffness else 1.0
+    elastic_base = 0.5  # factor of the clearance above an elastic base
+    lowest *= elastic_base if stack.base_stiffness else 1.0
     return float(decay.min(initial=lowest))
 
 
@@ -284,7 +283,8 @@ def _difference_quotient(
     if not isfinite(thickness):
         return np.zeros_like(mean)
     x2 = (apart * (thickness / 2)) ** 2
-    nearly = np.abs(x2.real) + np.abs(x2.imag) < SERIES_LIMIT**2
+    series_limit = 0.05  # x below which a series gives tanh x / x, exact to 1e-15
+    nearly = np.abs(x2.real) + np.abs(x2.imag) < series_limit**2
     if not nearly.any():
         return np.asarray((es - ep) / apart)
     series = 1 - x2 * (1 / 3 - x2 * (2 / 15 - x2 * (17 / 315 - x2 * (62 / 2835))))

@@ -8,12 +8,7 @@ import numpy as np
 
 from simple_model.typing import Bools, Complex, Floats, Ints
 
-LONGEST_GAP = 3  # frequencies without a root, near which a mode may begin to leak
 UNLIKE = 0.3  # misfit of two roots of different modes
-SURE, RIVAL = 0.06, 0.15  # largest misfit of a safe match; least misfit of its rivals
-NARROW = 1.05  # ratio of two frequencies between which no mode is lost
-ROUND_OFF = 1e-9  # of a wavenumber: smaller imaginary parts are 0
-SHAPE_WEIGHT = 0.1  # of unlike shapes in the misfit
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,10 +46,11 @@ def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots
     """
     count = len(omega)
     index = np.full((count, 0), -1)
+    longest_gap = 3  # frequencies without a root, near which a mode may begin to leak
     for f in range(count):
         known = np.flatnonzero(np.isfinite(roots.squared[f]))
         latest = np.where(index >= 0, np.arange(count)[:, None], -1).max(axis=0, initial=-1)
-        alive = np.flatnonzero(f - latest <= 1 + LONGEST_GAP)
+        alive = np.flatnonzero(f - latest <= 1 + longest_gap)
         last = index[latest[alive], alive]
         costs, matches = _matches(roots, omega, (latest[alive], last), (f, known))
         pairs = [
@@ -70,7 +66,8 @@ def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots
     index = index[:, (index >= 0).any(axis=0)]
     roots = roots.apply(lambda values: values[returned])
     decay = np.abs(roots.wavenumbers.imag)
-    decay = np.where(decay > ROUND_OFF * np.abs(roots.wavenumbers), decay, 0.0)
+    round_off = 1e-9  # of a wavenumber: smaller imaginary parts are 0
+    decay = np.where(decay > round_off * np.abs(roots.wavenumbers), decay, 0.0)
     least = np.where(index >= 0, _at(decay, index), np.inf).min(axis=0)
     slowness = np.where(decay == 0, np.abs(roots.wavenumbers.real) / omega[returned, None], 0.0)
     slowest = np.where(index >= 0, _at(slowness, index), 0.0).max(axis=0)
@@ -91,12 +88,14 @@ def frequencies_between(roots: Roots, omega: Floats, waves: Bools, most: int) ->
     `waves` (f, m) marks roots that are waves.
     """
     further = []
-    for f in np.flatnonzero(omega[1:] > NARROW * omega[:-1]).tolist():
+    sure, rival = 0.06, 0.15  # largest misfit of a safe match; least misfit of its rivals
+    narrow = 1.05  # ratio of two frequencies between which no mode is lost
+    for f in np.flatnonzero(omega[1:] > narrow * omega[:-1]).tolist():
         here, there = (np.flatnonzero(np.isfinite(roots.squared[g])) for g in (f, f + 1))
         costs, pairs = _matches(roots, omega, (np.full(len(here), f), here), (f + 1, there))
         is_sure = np.zeros(costs.shape, bool)
-        is_sure[pairs] = costs[pairs] <= SURE
-        rivals = costs < RIVAL
+        is_sure[pairs] = costs[pairs] <= sure
+        rivals = costs < rival
         is_sure &= (rivals.sum(axis=1, keepdims=True) == 1) & (rivals.sum(axis=0) == 1)
         for g, chosen, axis in ((f, here, 1), (f + 1, there, 0)):
             slowness = np.where(waves[g, chosen], np.abs(roots.wavenumbers[g, chosen].real), 0.0)
@@ -151,4 +150,5 @@ def _misfit(
     a, b = (x.reshape(len(x), roots.shapes[0, 0].size)
             for x in (roots.shapes[f, m], roots.shapes[g, n]))  # fmt: skip
     a, b = (x / np.maximum(np.linalg.norm(x, axis=1), 1e-300)[:, None] for x in (a, b))
-    return np.asarray(missed + SHAPE_WEIGHT * (1 - np.abs(a.conj() @ b.T)))
+    shape_weight = 0.1  # of unlike shapes in the misfit
+    return np.asarray(missed + shape_weight * (1 - np.abs(a.conj() @ b.T)))

@@ -21,9 +21,6 @@ from simple_model.layers.prony import ModulusLaw, PronySeries, check_passive, fi
 from simple_model.typing import Complex, Floats
 
 COLUMNS = ("frequency_hz", "storage_pa", "loss_pa")
-MOST_ROWS, FITTED_ROWS = 10_000, 300  # of a table, and about as many that are fitted
-LOWEST, HIGHEST = 1e-3, 1e6  # Hz, of a table
-TABLE_TOLERANCE = 0.005  # relative deviation of the series of a table without noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,10 +149,11 @@ class ModulusTable:
 
     def __post_init__(self) -> None:
         f, mu = self._arrays
-        if f.shape != mu.shape or f.ndim != 1 or not (f > 0).any() or len(f) > MOST_ROWS:
+        most_rows = 10_000  # of a table, and about as many that are fitted
+        if f.shape != mu.shape or f.ndim != 1 or not (f > 0).any() or len(f) > most_rows:
             raise ValueError(
                 f"a table of complex moduli has {len(f)} frequencies and {len(mu)} moduli; give "
-                f"one modulus for each frequency, at least one above 0 Hz, at most {MOST_ROWS}"
+                f"one modulus for each frequency, at least one above 0 Hz, at most {most_rows}"
             )
         _check_frequencies(f)
         check_passive(f, mu)
@@ -208,9 +206,10 @@ class ModulusTable:
 
 
 def _check_frequencies(f: Floats) -> None:
-    outside = ((f < LOWEST) | (f > HIGHEST)) & ~((f == 0) & (np.arange(len(f)) == 0))
+    lowest, highest = 1e-3, 1e6  # Hz, of a table
+    outside = ((f < lowest) | (f > highest)) & ~((f == 0) & (np.arange(len(f)) == 0))
     for wrong, problem in (
-        (outside, f"which is outside {LOWEST:g} to {HIGHEST:g} Hz; only the first may be 0"),
+        (outside, f"which is outside {lowest:g} to {highest:g} Hz; only the first may be 0"),
         (
             np.diff(f, prepend=-1.0) <= 0,
             "which does not rise; give frequencies in ascending order",
@@ -226,13 +225,15 @@ def _check_frequencies(f: Floats) -> None:
 def _series(table: ModulusTable) -> PronySeries:
     f = np.array(table.frequencies)
     measured = f[f > 0]
-    fitted = measured[:: max(1, len(f) // FITTED_ROWS)]
+    fitted_rows = 300  # of a table, and about as many that are fitted
+    fitted = measured[:: max(1, len(f) // fitted_rows)]
+    table_tolerance = 0.005  # relative deviation of the series of a table without noise
     return fit_prony(
         table.between,
         band=(float(measured[0]), float(measured[-1])),
         rest=table.moduli[0].real if f[0] == 0 else None,
         frequencies=tuple(fitted.tolist()),
-        tolerance=TABLE_TOLERANCE,
+        tolerance=table_tolerance,
     )
 
 

@@ -28,13 +28,6 @@ ModulusLaw = Callable[[Any], Any]  # complex shear modulus in Pa at angular freq
 
 BAND = (1.0, 2000.0)  # Hz: lines of loads, and modes that they excite
 FIT_TOLERANCE = 0.005  # relative deviation of a series; motion near resonances deviates more
-MOST_TERMS = 16
-PER_DECADE = 40  # frequencies at which a law is evaluated
-BEYOND = (0.5, 1.0, 2.0, 4.0, 8.0)  # factors by which times extend beyond the ends of a band
-FAR_BELOW = 1e3  # times the slowest period over 2 pi: time of a term below the band
-NO_BETTER = 1.1  # times the smallest deviation, accepted for fewer terms if data are noisy
-LEAST_MODULUS = 1e-3  # of the first modulus: lowest modulus at rest of a law without one
-LEAST_LOSS = -1e-9  # of the modulus: round-off of a law without loss
 # Measured moduli with random errors of 5 % in both parts are 7 % from every causal law; a
 # hysteretic loss factor of 0.2 is 10 % away, of 0.3 15 %. The limit applies to the root mean
 # square, so single outliers pass; a warning states their size.
@@ -43,9 +36,8 @@ CAUSAL = 0.10
 
 REFERENCE = 150.0  # Hz, where the storage modulus is the given one
 LOSS_BAND = (10.0, 2000.0)  # Hz, where the loss factor is nearly constant
-SLOWEST, FASTEST, LOSS_TERMS = 8.0, 1600.0, 4  # Hz, 1 / (2 pi time): best for losses up to 2
+SLOWEST = 8.0  # Hz, 1 / (2 pi time): best for losses up to 2
 LARGEST_LOSS_FACTOR = 10.0
-LOSS_FREQUENCIES = 93  # at which the series is fitted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,16 +123,20 @@ def fit_prony(
     ValueError
         If the law is not passive or not causal in the band.
     """
-    count = 2 + round(PER_DECADE * np.log10(band[1] / band[0]))
+    per_decade = 40  # frequencies at which a law is evaluated
+    count = 2 + round(per_decade * np.log10(band[1] / band[0]))
     f = np.unique([*np.geomspace(*band, count), *(x for x in frequencies if x > 0)])
     w = 2 * np.pi * f
     mu = np.asarray(np.broadcast_to(law(w), w.shape), np.complex128)
     check_modulus(f, mu)
     candidates: list[PronySeries] = []
-    ends = [(w[0] / slow, w[-1] * fast) for slow in BEYOND for fast in BEYOND]
+    beyond = (0.5, 1.0, 2.0, 4.0, 8.0)  # factors by which times extend beyond the ends of a band
+    ends = [(w[0] / slow, w[-1] * fast) for slow in beyond for fast in beyond]
+    most_terms = 16
+    far_below = 1e3  # times the slowest period over 2 pi: time of a term below the band
     # A law may relax far below the band, as fractional ones of small exponents do.
-    for further in ([], [FAR_BELOW / w[0]]) if rest else ([],):
-        for n in range(MOST_TERMS + 1):
+    for further in ([], [far_below / w[0]]) if rest else ([],):
+        for n in range(most_terms + 1):
             fits = [
                 fitted_series(w, mu, np.append(1 / np.geomspace(*end, n), further), rest, band)
                 for end in ends[: None if n else 1]
@@ -148,7 +144,8 @@ def fit_prony(
             candidates.append(min(fits, key=lambda series: series.error))
             if candidates[-1].error <= tolerance:
                 return candidates[-1]
-    enough = NO_BETTER * min(series.error for series in candidates)
+    no_better = 1.1  # times the smallest deviation, accepted for fewer terms if data are noisy
+    enough = no_better * min(series.error for series in candidates)
     return next(series for series in candidates if series.error <= enough)
 
 
@@ -172,10 +169,11 @@ def check_modulus(frequencies: Floats, moduli: Complex) -> None:
 
 def check_passive(frequencies: Floats, moduli: Complex) -> None:
     """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz that are not passive."""
+    least_loss = -1e-9  # of the modulus: round-off of a law without loss
     limits = (
         (~np.isfinite(moduli), "modulus", np.real, "must be finite"),
         (moduli.real <= 0, "storage modulus", np.real, "must be above 0"),
-        (moduli.imag < LEAST_LOSS * np.abs(moduli), "loss modulus", np.imag, "must be 0 or above, "
+        (moduli.imag < least_loss * np.abs(moduli), "loss modulus", np.imag, "must be 0 or above, "
          "because a passive solid absorbs energy"),
     )  # fmt: skip
     for wrong, name, part, condition in limits:
@@ -198,7 +196,8 @@ def fitted_series(
 
     phase = 1j * w[:, None] * times
     columns = np.hstack([np.ones((len(w), 1)), 1j * w[:, None], phase / (1 + phase)])
-    lasting = rest or LEAST_MODULUS * abs(mu[0])
+    least_modulus = 1e-3  # of the first modulus: lowest modulus at rest of a law without one
+    lasting = rest or least_modulus * abs(mu[0])
     A, b = columns / np.abs(mu)[:, None], (mu - lasting) / np.abs(mu)
     A[:, 0] *= rest is None
     A = np.vstack([A.real, A.imag])
@@ -233,9 +232,11 @@ def constant_loss(loss_factor: float) -> PronySeries:
     of it at 3 Hz, and 0 at rest, where the modulus is 0.92, 0.76 and 0.35 mu for eta = 0.03, 0.1
     and 0.4.
     """
-    w, w_0 = 2 * np.pi * np.geomspace(*LOSS_BAND, LOSS_FREQUENCIES), 2 * np.pi * REFERENCE
+    loss_frequencies = 93  # at which the series is fitted
+    w, w_0 = 2 * np.pi * np.geomspace(*LOSS_BAND, loss_frequencies), 2 * np.pi * REFERENCE
     power = 2 / np.pi * np.arctan(loss_factor)
     exact = (1j * w / w_0) ** power / np.cos(np.pi * power / 2)
-    times = 1 / (2 * np.pi * np.geomspace(SLOWEST, FASTEST, LOSS_TERMS))
+    fastest, loss_terms = 1600.0, 4  # Hz, 1 / (2 pi time): best for losses up to 2
+    times = 1 / (2 * np.pi * np.geomspace(SLOWEST, fastest, loss_terms))
     series = fitted_series(w, exact, times, None, LOSS_BAND)
     return series.scaled(1 / float(series(w_0).real))

@@ -27,9 +27,6 @@ from simple_model.typing import Complex, Floats
 
 ORDER = 8
 SHIFT = 0.1 + 1.0j  # of the largest squared shear wavenumber
-PER_ELEMENT = 5.0  # shear wavenumber times length, of the longest element
-MOST = 20  # elements with dense matrices: some seconds for fifty frequencies
-FEWEST = 2  # elements of all layers, in proportion to their thickness
 MATCHED = np.exp(-0.6j) * np.array([0.75, 1.5, 3.0, 6.0, 12.0])  # element lengths over 1/|k_s|
 
 
@@ -77,20 +74,23 @@ def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
     """Return the layer of each element, and lengths (f, e) in m; raise a ValueError if too many."""
     layers, lengths = [], []
     finite = sum(thickness for thickness in stack.thicknesses if np.isfinite(thickness))
+    per_element = 5.0  # shear wavenumber times length, of the longest element
+    fewest = 2  # elements of all layers, in proportion to their thickness
     for k, (material, thickness) in enumerate(zip(stack.materials, stack.thicknesses, strict=True)):
         shear = np.abs(np.sqrt(material.density / material.complex_modulus(omega)) * omega)
         if np.isinf(thickness):
             layers += [k] * len(MATCHED)
             lengths += [length / shear for length in MATCHED]
         else:
-            waves = float(shear.max()) * thickness / PER_ELEMENT
-            count = ceil(max(waves, FEWEST * thickness / finite - 1e-9))
+            waves = float(shear.max()) * thickness / per_element
+            count = ceil(max(waves, fewest * thickness / finite - 1e-9))
             layers += [k] * count
             lengths += [np.full(len(omega), thickness / count)] * count
-    if len(layers) > MOST:
+    most = 20  # elements with dense matrices: some seconds for fifty frequencies
+    if len(layers) > most:
         raise ValueError(
             f"dispersion curves up to {omega.max() / 2 / np.pi:g} Hz of layers of {1e3 * finite:g} "
-            f"mm need {len(layers)} elements in depth, more than {MOST}; use a half-space, "
+            f"mm need {len(layers)} elements in depth, more than {most}; use a half-space, "
             "thinner or fewer layers, or lower frequencies"
         )
     return layers, np.array(lengths, np.complex128).T

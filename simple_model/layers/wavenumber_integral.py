@@ -34,12 +34,8 @@ INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine
 FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
 AT_ONCE = 2**12  # pairs of frequency and wavenumber, so that arrays stay in cache
 UNRESOLVED = "the wavenumber integral does not converge; add loss, or give a free slab a base"
-CHECK_INTERVAL = 8  # batches between two checks of the grid
 BATCH = 256  # frequencies at a time
-FIRST_BATCH = 64  # frequencies of a transient; later batches are as long as all before
 FEWEST_INTERVALS = 8  # between the first Chebyshev points of a batch
-INTERPOLATION_ERROR = 1e-7  # relative, so that weak lines are accurate too
-COMPARED = 16  # frequencies of a smooth batch at which two grids are compared
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,9 +115,10 @@ def point_integrals(
         return _grid(field.orders, r, width, lift, n)
 
     n, before = FEWEST_NODES, 0.0
+    check_interval = 8  # batches between two checks of the grid
     for part in _batches(w):
         lift = _lift(field, r, w[part], width)
-        if lift != before or part.start % (CHECK_INTERVAL * BATCH) == 0:
+        if lift != before or part.start % (check_interval * BATCH) == 0:
             least = n if lift == before else FEWEST_NODES
             n, integrals[:, part] = _resolve(field, w[part], partial(grid, lift), least)
         else:
@@ -135,8 +132,9 @@ def point_integrals(
 
 def _batches(w: Complex) -> Iterator[slice]:
     start = 0
+    first_batch = 64  # frequencies of a transient; later batches are as long as all before
     while start < len(w):
-        stop = start + (max(FIRST_BATCH, start) if _is_damped(w) else BATCH)
+        stop = start + (max(first_batch, start) if _is_damped(w) else BATCH)
         yield slice(start, stop)
         start = stop
 
@@ -152,7 +150,8 @@ def _lift(field: Field, r: Floats, w: Complex, width: float) -> float:
 
 def _resolve(field: Field, w: Complex, grid: Callable[[int], _Grid], n: int) -> tuple[int, Complex]:
     """Double the number of wavenumbers, from n, until the integrals converge. Return both."""
-    some = w[:: -(-len(w) // COMPARED)] if _is_damped(w) else w
+    compared = 16  # frequencies of a smooth batch at which two grids are compared
+    some = w[:: -(-len(w) // compared)] if _is_damped(w) else w
     coarse = _integrate(field, some, grid(n))
     while n < MOST_NODES:
         fine = _integrate(field, some, grid(2 * n))
@@ -185,6 +184,7 @@ def _interpolate(field: Field, w: Complex, grid: _Grid) -> Complex | None:
 
     n, error = FEWEST_INTERVALS, np.nan
     values = at(_chebyshev(n))
+    interpolation_error = 1e-7  # relative, so that weak lines are accurate too
     while 4 * n <= len(w):
         between = _chebyshev(2 * n)[1::2]
         finer = np.repeat(values, 2, axis=1)[:, :-1]
@@ -193,9 +193,9 @@ def _interpolate(field: Field, w: Complex, grid: _Grid) -> Complex | None:
         error = (errors / np.abs(finer).max(axis=(1, 2))).max()
         values, n = finer, 2 * n
         predicted = error * (error / before) ** 2  # as it falls geometrically
-        if np.fmin(error, predicted) <= INTERPOLATION_ERROR:
+        if np.fmin(error, predicted) <= interpolation_error:
             return _through(values, (w.real - middle) / half)
-        if error ** (len(w) / n) > INTERPOLATION_ERROR**0.5:  # at the largest number allowed
+        if error ** (len(w) / n) > interpolation_error**0.5:  # at the largest number allowed
             return None
     return None
 

@@ -46,9 +46,7 @@ from simple_model.typing import Floats, Ints
 STEP = 0.6  # in log t: 1/k within 8e-4
 NEAREST = 0.3  # over the highest wavenumber: for smaller t all Gaussians are 1
 FARTHEST = 100.0  # sides: larger t contribute 1e-3 of the mass
-DECAYED = 6.0  # exp(-36) is negligible
 ORDER = 6  # of moments
-SHORTEST = 3.0  # rad: sound of a larger k0 times half the diagonal has the resistance at this one
 ZERO = 1e-9  # of the largest integral, of functions that another symmetry excludes
 
 
@@ -79,7 +77,9 @@ class AirLoss:
         (m,) with the forces patterns^T R patterns v.
         """
         k0 = np.asarray(omega, np.float64)[:, None, None] / SPEED_OF_SOUND
-        k0 = np.minimum(k0, SHORTEST / self.reach)
+        # Rad: sound of a larger k0 times half the diagonal has the resistance at this one.
+        shortest = 3.0
+        k0 = np.minimum(k0, shortest / self.reach)
         if not len(self.orders):
             each = np.eye(len(self.patterns))
             return np.asarray(k0**4 * SPEED_OF_SOUND / (12 * pi * self.density) * each)
@@ -253,9 +253,10 @@ def _gaussian_products(
     times k^2, of the transforms at 2 kappa / length over sqrt(length).
     """
     tau = 2 * t / length
+    decayed = 6.0  # exp(-36) is negligible
     # Products of the transforms have no part beyond twice the line's length.
-    spacing = pi / (1 + DECAYED * tau)
-    kappa = (np.arange(int(np.ceil(DECAYED / tau / spacing)) + 1) + 0.5) * spacing
+    spacing = pi / (1 + decayed * tau)
+    kappa = (np.arange(int(np.ceil(decayed / tau / spacing)) + 1) + 0.5) * spacing
     weight = 2 / pi * spacing * np.exp(-((kappa * tau) ** 2))
     parts = transforms(np.asarray(kappa, np.float64))
     values, slopes = (

@@ -19,9 +19,7 @@ from simple_model.layers.material import Material
 from simple_model.plates.modes import PlateModes
 from simple_model.typing import Complex, Floats
 
-NEWTON_STEPS = 3  # on eigenvalues
 CRITICAL = 1e-6  # relative distance of two poles, below which a mode is made stiffer
-STIFFER = 1.0001
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,8 +108,9 @@ def free_vibration(stiffness: Floats, times: Floats) -> FreeModes:
     poles = _poles(stiffness, times)
     apart = np.abs(poles[:, :, None] - poles[:, None]) / np.abs(poles).max(axis=1)[:, None, None]
     apart[:, range(poles.shape[1]), range(poles.shape[1])] = np.inf
+    stiffer = 1.0001
     if (critical := apart.min(axis=(1, 2)) < CRITICAL).any():
-        stiffness = stiffness * np.where(critical, STIFFER, 1.0)[:, None]
+        stiffness = stiffness * np.where(critical, stiffer, 1.0)[:, None]
         poles[critical] = _poles(stiffness[critical], times)
     residues = 1 / _slope(stiffness, times, poles)
     return FreeModes(poles=poles, residues=residues * (1 + np.sign(poles.imag)) / 2)
@@ -128,7 +127,8 @@ def _poles(stiffness: Floats, times: Floats) -> Complex:
     companion[:, 2:, 1] = speed[:, None]
     companion[:, range(2, n), range(2, n)] = -1 / times
     poles = np.linalg.eigvals(companion).astype(np.complex128)
-    for _ in range(NEWTON_STEPS):
+    newton_steps = 3  # on eigenvalues
+    for _ in range(newton_steps):
         poles -= _stiffness(stiffness, times, poles) / _slope(stiffness, times, poles)
     return poles
 

@@ -21,9 +21,6 @@ from simple_model.typing import Bools, Floats, Ints
 
 # Whether a supported edge holds the in-plane displacement across and along the edge.
 IN_PLANE = {"held": (True, True), "sliding": (True, False), "movable": (False, False)}
-SHIFT = 1e-10  # of the mean stiffness, so that a plate without support can be solved
-MOVES = "xi,yj,ijp->pxy"
-GATHERS = "xi,yj,pxy->ijp"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,8 +106,9 @@ class InPlane:
         free = np.flatnonzero(np.concatenate([_free_of_clips(plate, *lines) for lines in (u, v)]))
         K, M = K[np.ix_(free, free)], M[np.ix_(free, free)]
         factor = None
+        shift = 1e-10  # of the mean stiffness, so that a plate without support can be solved
         if len(free):
-            factor = linalg.cho_factor(K + SHIFT * np.trace(K) / np.trace(M) * M)
+            factor = linalg.cho_factor(K + shift * np.trace(K) / np.trace(M) * M)
         return InPlane(A=A, grid=grid, u=(u[0], u[1]), v=(v[0], v[1]), free=free, factor=factor)
 
     def incompatible(self, strains: Floats) -> Floats:
@@ -119,16 +117,18 @@ class InPlane:
             return strains
         xx, yy, xy = np.tensordot(self.A, strains, axes=1) * self.grid.areas
         (ux, uy), (vx, vy) = self.u, self.v
-        of_u = _sum(GATHERS, (ux.slopes, uy.values, xx), (ux.values, uy.slopes, xy))
-        of_v = _sum(GATHERS, (vx.values, vy.slopes, yy), (vx.slopes, vy.values, xy))
+        gathers = "xi,yj,pxy->ijp"
+        of_u = _sum(gathers, (ux.slopes, uy.values, xx), (ux.values, uy.slopes, xy))
+        of_v = _sum(gathers, (vx.values, vy.slopes, yy), (vx.slopes, vy.values, xy))
         forces = np.concatenate([f.reshape(-1, f.shape[2]) for f in (of_u, of_v)])
         moved = np.zeros_like(forces)
         moved[self.free] = -linalg.cho_solve(self.factor, forces[self.free])
         size = of_u.shape[0] * of_u.shape[1]
         u, v = moved[:size].reshape(of_u.shape), moved[size:].reshape(of_v.shape)
+        moves = "xi,yj,ijp->pxy"
         return strains + np.stack([
-            _sum(MOVES, (ux.slopes, uy.values, u)), _sum(MOVES, (vx.values, vy.slopes, v)),
-            _sum(MOVES, (ux.values, uy.slopes, u), (vx.slopes, vy.values, v)),
+            _sum(moves, (ux.slopes, uy.values, u)), _sum(moves, (vx.values, vy.slopes, v)),
+            _sum(moves, (ux.values, uy.slopes, u), (vx.slopes, vy.values, v)),
         ])  # fmt: skip
 
 

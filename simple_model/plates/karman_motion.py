@@ -43,8 +43,6 @@ from simple_model.plates.path_forces import MIDDLE, modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
 from simple_model.typing import Complex, Floats, Ints
 
-HIGHEST_PHASE = 1.2  # rad per half step; faster modes are slowed down to it
-
 
 def linear_motion(
     modes: PlateModes,
@@ -230,8 +228,9 @@ class _Scheme:
         squared = np.maximum(plate.squared, 0.0)
         bending = np.diagonal(plate.bending) * (loss.storage(np.sqrt(squared)) - 1)
         half = np.sqrt(np.maximum(squared + bending, 0.0)) * dt / 2
-        mass = 1 / np.sinc(np.minimum(half, HIGHEST_PHASE) / np.pi) ** 2
-        mass *= np.maximum(half / HIGHEST_PHASE, 1) ** 2
+        highest_phase = 1.2  # rad per half step; faster modes are slowed down to it
+        mass = 1 / np.sinc(np.minimum(half, highest_phase) / np.pi) ** 2
+        mass *= np.maximum(half / highest_phase, 1) ** 2
         share = dt / 2 / loss.times
         return _Scheme(
             dt=dt, mass=mass, bending=plate.bending,

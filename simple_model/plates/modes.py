@@ -33,19 +33,9 @@ from simple_model.plates.air import AirLoss, air_of
 from simple_model.plates.polynomials import LineBasis, line_basis, piecewise_basis
 from simple_model.typing import Bools, Complex, Floats, Ints
 
-SUPPORTS = ("clamped", "simply", "free")
 FINEST = 350.0  # rad/m: higher wavenumbers have a third of the force of a 4.35 mm focal spot
-MARGIN = 8  # polynomials more than a wavenumber requires
-CLIP_MARGIN = 3  # the same for pieces between the sides of clips
-SAME_SIDE = 0.01  # of the radius of a clip: sides and edges closer than that coincide
-LAYER = 0.1  # of the radius of a clip, width of a piece along its sides
 SHIFT = 1e-12  # of the mean squared frequency
 MOST_DOFS = 6000  # of one symmetry, for some minutes
-TIE = 1e-9  # of the mass, for sound: equal frequencies have one mode that radiates, others do not
-COUPLED = 1.3  # of the frequency of a line: modes below 1 / 1.3 or above 1.3 are almost uncoupled
-RESIDUAL = 1e-10  # of the largest force, of the solution for coupled modes
-SWEEPS = 30  # that a line may need
-LINES_AT_ONCE = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,8 +90,9 @@ class Plate:
                 f"d12 = {self.d12} of a plate is not below sqrt(d11 d22) = "
                 f"{(self.d11 * self.d22) ** 0.5:.4g}, so the plate would be unstable; lower d12"
             )
+        supports = ("clamped", "simply", "free")
         for name in ("left", "right", "front", "back"):
-            choose(name, getattr(self, name), SUPPORTS)
+            choose(name, getattr(self, name), supports)
         for x, y in self.clips:
             if not (abs(x) <= self.size_x / 2 and abs(y) <= self.size_y / 2):
                 raise ValueError(
@@ -273,7 +264,8 @@ def _own_stiffness(family: Family, edge_loss: float, w: Floats, added: Complex) 
 
 
 def _chunks(lines: Ints) -> list[Ints]:
-    return np.array_split(lines, -(-len(lines) // LINES_AT_ONCE)) if len(lines) else []
+    lines_at_once = 64
+    return np.array_split(lines, -(-len(lines) // lines_at_once)) if len(lines) else []
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -327,9 +319,11 @@ class _Coupled:
         matrices (van der Vorst and Melissen, IEEE Trans Magn 26:706 (1990)). The preconditioner
         solves modes near a line together and all others alone.
         """
+        # Of the frequency of a line: modes below 1 / 1.3 or above 1.3 are almost uncoupled.
+        coupled = 1.3
         low, high = (
             np.searchsorted(self.squared, (self.w * factor) ** 2)
-            for factor in (1 / COUPLED, COUPLED)
+            for factor in (1 / coupled, coupled)
         )
         near = [slice(*each) for each in zip(low.tolist(), high.tolist(), strict=True)]
         factors = [
@@ -344,11 +338,13 @@ class _Coupled:
                     q[k, modes] = zgetrs(*factor, left[k, modes])[0]
             return np.asarray(q)
 
-        allowed = RESIDUAL * np.abs(forces).max(axis=1)
+        residual = 1e-10  # of the largest force, of the solution for coupled modes
+        allowed = residual * np.abs(forces).max(axis=1)
         q, left = np.zeros_like(self.own), forces.astype(np.complex128)
         toward = along = together(left)
         size = (left * toward).sum(axis=1)
-        for _ in range(SWEEPS):
+        sweeps = 30  # that a line may need
+        for _ in range(sweeps):
             image = self.own * along + self.between(along)
             with np.errstate(divide="ignore", invalid="ignore"):  # of lines that are solved
                 step = np.nan_to_num(size / (along * image).sum(axis=1), posinf=0.0)[:, None]
@@ -383,10 +379,12 @@ def _line_bases(plate: Plate, axis: int, finest: float, mirrored: bool) -> tuple
     """Functions along x or y up to a wavenumber in rad/m, on pieces between sides of clips."""
     size = (plate.size_x, plate.size_y)[axis]
     ends = ((plate.left, plate.right), (plate.front, plate.back))[axis]
+    margin = 8  # polynomials more than a wavenumber requires
     if not (inner := _breaks(plate, axis, size)):
-        return line_basis(size, ends, int(np.ceil(finest * size / 2)) + MARGIN, mirrored)
+        return line_basis(size, ends, int(np.ceil(finest * size / 2)) + margin, mirrored)
     breaks = np.array([-size / 2, *inner, size / 2])
-    degrees = [int(np.ceil(finest * piece / 2)) + CLIP_MARGIN for piece in np.diff(breaks)]
+    clip_margin = 3  # the same for pieces between the sides of clips
+    degrees = [int(np.ceil(finest * piece / 2)) + clip_margin for piece in np.diff(breaks)]
     return piecewise_basis(breaks, ends, degrees, mirrored)
 
 
@@ -396,9 +394,11 @@ def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
     """
     reach = plate.clip_radius
     sides = [clip[axis] + turn * reach for clip in plate.clips for turn in (-1, 1) if reach]
-    inside = _apart([], sides, size / 2, SAME_SIDE * reach)
-    lines = [at + turn * LAYER * reach for at in inside for turn in (-1, 1)]
-    return sorted(_apart(inside, lines, size / 2, LAYER * reach / 2))
+    same_side = 0.01  # of the radius of a clip: sides and edges closer than that coincide
+    inside = _apart([], sides, size / 2, same_side * reach)
+    layer = 0.1  # of the radius of a clip, width of a piece along its sides
+    lines = [at + turn * layer * reach for at in inside for turn in (-1, 1)]
+    return sorted(_apart(inside, lines, size / 2, layer * reach / 2))
 
 
 def _apart(first: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
@@ -415,12 +415,14 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     area = np.kron(x.mass, y.mass)
     mass = np.asarray(plate.mass_per_area * area, np.float64)
     patterns, orders = np.zeros((0, len(mass))), np.zeros((0, 2), np.int64)
+    # Of the mass, for sound: equal frequencies have one mode that radiates, others do not.
+    tie = 1e-9
     if plate.air_density:
         added, patterns, orders = air_of(x, y, plate.air_density, plate.frame_width)
         mass += added
         for radiating in patterns[:1]:
             unit = radiating / np.linalg.norm(radiating)
-            mass += TIE * plate.mass_per_area * np.outer(unit, unit)
+            mass += tie * plate.mass_per_area * np.outer(unit, unit)
     K = bending if stretching is None else bending + stretching
     free = _free_of_clips(plate, x, y)
     if free is None:

@@ -15,8 +15,6 @@ from simple_model.plates.polynomials import gauss_points
 from simple_model.typing import Complex, Floats
 
 MIDDLE = (0.0, 0.0)
-SPACING = 0.9  # of Gauss points, in standard deviations of the focal spot
-SPARE = 8  # more Gauss points
 
 
 def modal_path_forces(
@@ -63,5 +61,7 @@ def plate_lines(
 def _gauss(low: float, high: float, detail: float) -> tuple[Floats, Floats]:
     """Gauss points and weights (k,) in m between two places, for a detail in m."""
     high = max(low, high)
-    count = int(np.ceil(np.pi / 2 * (high - low) / (SPACING * detail))) + SPARE
+    spacing = 0.9  # of Gauss points, in standard deviations of the focal spot
+    spare = 8  # more Gauss points
+    count = int(np.ceil(np.pi / 2 * (high - low) / (spacing * detail))) + spare
     return gauss_points(np.array([low, high]), [count])

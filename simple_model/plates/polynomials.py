@@ -18,7 +18,6 @@ from simple_model.typing import Bools, Floats, Ints
 
 # Derivatives that are zero at an end.
 FIXED: Mapping[str, tuple[int, ...]] = {"clamped": (0, 1), "simply": (0,), "free": ()}
-NULL_RATIO = 1e-10  # of the largest singular value, below which a condition depends on others
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -217,9 +216,10 @@ def _bubbles(degree: int, orders: Ints, ends: Sequence[str]) -> Floats:
     ]
     coefficients = np.zeros((degree + 1, len(orders)))
     coefficients[orders, np.arange(len(orders))] = 1
+    null_ratio = 1e-10  # of the largest singular value, below which a condition depends on others
     if rows:
         unit = [row / np.linalg.norm(row) for row in rows]
-        coefficients = coefficients @ null_space(np.array(unit), rcond=NULL_RATIO)
+        coefficients = coefficients @ null_space(np.array(unit), rcond=null_ratio)
     return np.asarray(coefficients)
 
 

@@ -34,12 +34,7 @@ from simple_model.plates.in_plane import IN_PLANE, Grid, InPlane
 from simple_model.plates.modes import Family, Plate, PlateModes
 from simple_model.typing import Floats, Ints
 
-MARGIN = 8  # polynomials more than products of two modes require
-CLIP_MARGIN = 4  # the same on a piece between the sides of clips
 MOST_PAIRS = 500  # of modes, of one symmetry, from which states of stress are made
-EQUAL_BELOW = 2 * np.pi * 200.0  # rad/s: modes below it count as equally strong
-SMALLEST_STATE = 0.06  # of the largest energy norm of a state of stress
-ROUND_OFF = 1e-10  # of the largest energy of a state of stress
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,14 +117,16 @@ def karman_plate(
         )
     chosen = np.sort(np.argsort(modes.squared, kind="stable")[:count])
     squared, slopes = modes.squared[chosen], _Slopes.of(modes, chosen)
-    reach = 1 / np.maximum(squared, EQUAL_BELOW**2)
+    equal_below = 2 * np.pi * 200.0  # rad/s: modes below it count as equally strong
+    reach = 1 / np.maximum(squared, equal_below**2)
     A, found = membrane_stiffness(modes.plate, thickness), []
     for odd in product(*((0, 1) if split else (0,) for split in slopes.grid.split)):
         problem = InPlane.of(modes.plate, A, slopes.grid, (odd[0], odd[1]), in_plane)
         turn = 2 * odd[0] + odd[1]
         found.append((turn, *_states_of_stress(problem, slopes, reach, turn)))
     energy = np.concatenate([each for _, each, _ in found])
-    least = SMALLEST_STATE**2 * energy.max()
+    smallest_state = 0.06  # of the largest energy norm of a state of stress
+    least = smallest_state**2 * energy.max()
     strong = [(turn, states[..., each > least]) for turn, each, states in found]
     return KarmanPlate(
         modes=modes, chosen=chosen, squared=squared, bending=_bending(modes, chosen),
@@ -227,8 +224,10 @@ def _degrees(
         )
         for axis, slope in enumerate(slopes):
             largest[axis] = max(largest[axis], np.sqrt((slope / moved).max(initial=0.0)))
+    margin = 8  # polynomials more than products of two modes require
+    clip_margin = 4  # the same on a piece between the sides of clips
     return [
-        [int(np.ceil(k * piece)) + (MARGIN if len(b) == 2 else CLIP_MARGIN) for piece in np.diff(b)]
+        [int(np.ceil(k * piece)) + (margin if len(b) == 2 else clip_margin) for piece in np.diff(b)]
         for k, b in zip(largest, breaks, strict=True)
     ]
 
@@ -249,6 +248,7 @@ def _states_of_stress(
     weighted = np.tensordot(problem.A, strains, axes=1) * slopes.grid.areas
     gram = np.tensordot(strains, weighted, axes=([0, 2, 3], [0, 2, 3]))
     energy, vectors = np.linalg.eigh((gram + gram.T) / 2)
-    strong = energy > ROUND_OFF * energy[-1]
+    round_off = 1e-10  # of the largest energy of a state of stress
+    strong = energy > round_off * energy[-1]
     scaled = vectors[:, strong] / np.sqrt(energy[strong])
     return energy[strong], np.tensordot(weighted, scaled, axes=([1], [0]))
