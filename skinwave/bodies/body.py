@@ -39,10 +39,6 @@ from skinwave.system import extensions
 from skinwave.system.extensions import Registry
 from skinwave.typing import Floats
 
-KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
-AIR = (False, "free", "baffle")
-LARGEST = 2.0  # m: larger numbers are probably in mm
-
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
@@ -103,16 +99,19 @@ class Body:
         check_material(self.material)
         check_base(self.base, self.base_stiffness, depth=self.depth, is_plate=kind.is_plate)
         object.__setattr__(self, "sides", complete_sides(self.sides, kind.named_sides, self.kind))
+        # In a scene file.
+        keys = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}
+        largest = 2.0  # m: larger numbers are probably in mm
         for name in ("width", "height", "depth"):
             length = getattr(self, name)
             if name == "depth" and kind.is_layer and length == inf:
                 continue
             if not 0 < length < inf:
-                raise ValueError(f"{KEYS[name]} = {1e3 * length:g} must be finite and above 0")
-            if length > LARGEST:
+                raise ValueError(f"{keys[name]} = {1e3 * length:g} must be finite and above 0")
+            if length > largest:
                 raise ValueError(
-                    f"body {name} = {length:g} m exceeds {LARGEST:g} m; {length:g} mm are "
-                    f"{name} = {length / 1e3:g} in m, or {KEYS[name]} = {length:g} in a scene"
+                    f"body {name} = {length:g} m exceeds {largest:g} m; {length:g} mm are "
+                    f"{name} = {length / 1e3:g} in m, or {keys[name]} = {length:g} in a scene"
                 )
         if kind.discretise and {self.base, *self.conditions} == {"free"}:
             raise ValueError(
@@ -132,7 +131,8 @@ class Body:
         """Refuse properties that only a sheet has, and supports that contradict each other."""
         if self.solid.orthotropy is not None and not self.of_kind.is_plate:
             raise ValueError("an orthotropic material is for a sheet; use an isotropic material")
-        if self.air not in AIR:
+        air = (False, "free", "baffle")
+        if self.air not in air:
             raise ValueError(
                 f'air = {self.air!r} is unknown; use "free", "baffle", or false for vacuum'
             )

@@ -22,16 +22,10 @@ from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.tissue import HAND_CELL, hand_size, in_tissue_layers, support
 
-COARSEST = 2.0  # largest elements far from the middle, over h
-RIM = 0.7  # largest elements at the rim, over the radius of the edge
 # Elements at the surface over h, because motion there has the scale of the focal spot; the radius
 # in which they have that size; growth downwards over that sideways, as powers; height over width,
 # at which error and cost balance best.
-SURFACE, FINE_RADIUS, DOWNWARDS, FLAT = 0.8, 25e-3, 0.6, 0.8
-# Sides of boxes over the edges of their elements. Below the default size they grow by its third
-# root: rows of boxes are fine from side to side, and 2 mm would need 560,000 dofs where 230,000
-# are within 0.3 %.
-CELL = 0.85
+SURFACE, FLAT = 0.8, 0.8
 
 
 def discretise(body: Body, h: float) -> Discretised:
@@ -46,20 +40,27 @@ def discretise(body: Body, h: float) -> Discretised:
 
 def _coarsest(body: Body, h: float) -> float:
     """Largest element size in m; larger elements do not follow the rim, where waves reflect."""
-    return max(SURFACE * h, min(COARSEST * h, RIM * body.palm.edge_radius))
+    coarsest = 2.0  # largest elements far from the middle, over h
+    rim = 0.7  # largest elements at the rim, over the radius of the edge
+    return max(SURFACE * h, min(coarsest * h, rim * body.palm.edge_radius))
 
 
 def grid_lines(body: Body, h: float) -> Lines:
     """Return grid lines in m of the box around a palm, with cells that grow from its middle."""
-    side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
+    # Sides of boxes over the edges of their elements. Below the default size they grow by its third
+    # root: rows of boxes are fine from side to side, and 2 mm would need 560,000 dofs where 230,000
+    # are within 0.3 %.
+    cell = 0.85
+    side = cell * max(1.0, HAND_CELL / h) ** (1 / 3)
     finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
-    along = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest)
+    fine_radius, downwards = 25e-3, 0.6
+    along = Grading(radius=fine_radius, growth=GROWTH, coarsest=coarsest)
     x, y = (mirror_line(graded_axis(side / 2, finest, along)) for side in (body.width, body.height))
     # No cell is higher than its target size. Two meshes that are compared then differ more often in
     # their number of layers, which affects the error most.
     heights = [FLAT * finest]
     while (below := sum(heights)) < body.depth:
-        heights.append(min(heights[-1] * GROWTH**DOWNWARDS, coarsest))
+        heights.append(min(heights[-1] * GROWTH**downwards, coarsest))
     return x, y, -np.append(0.0, np.cumsum(heights))[::-1] * (body.depth / below)
 
 

@@ -47,22 +47,22 @@ class Relief:
 
     def of(self, breadth: float, length: float, thickness: float) -> Palm:
         """Return the palm with this relief; sizes in m."""
-        thin = min(1.0, thickness / (2 * EDGE_RADIUS))
-        corner = min(Palm.corner_radius, ROUNDEST * min(breadth, length) / 2)
+        edge_radius = 7e-3  # m: soft tissue on bone is thinner than a whole hand
+        thin = min(1.0, thickness / (2 * edge_radius))
+        roundest = 0.95  # of half the shorter side: rounder outlines have no straight side to mesh
+        corner = min(Palm.corner_radius, roundest * min(breadth, length) / 2)
         usual = {
             "cup_depth": thin * Palm.cup_depth,
             "thenar_height": thin * Palm.thenar_height,
             "hypothenar_height": thin * Palm.hypothenar_height,
             "pad_height": thin * Palm.pad_height,
             "corner_radius": corner,
-            "edge_radius": min(thin * EDGE_RADIUS, self.corner_radius or corner),
+            "edge_radius": min(thin * edge_radius, self.corner_radius or corner),
         }
         given = {name: value for name, value in vars(self).items() if value is not None}
         return Palm(breadth=breadth, length=length, thickness=thickness, **(usual | given))
 
 
-EDGE_RADIUS = 7e-3  # m: soft tissue on bone is thinner than a whole hand
-ROUNDEST = 0.95  # of half the shorter side: rounder outlines have no straight side to mesh
 PLAIN = Relief()
 
 
@@ -104,13 +104,15 @@ class Placement:
     lift: float = 0.0
 
     def __post_init__(self) -> None:
+        steepest = 60.0 + 1e-9  # degrees: almost no pressure acts on steeper bodies
         for name in ("tilt_x", "tilt_y"):
             degrees = np.degrees(getattr(self, name))
-            check_range(name, degrees, -STEEPEST, STEEPEST, " degrees", "; tilt the body less")
-        if not (np.isfinite(self.offset).all() and abs(self.lift) <= FURTHEST_LIFT):
+            check_range(name, degrees, -steepest, steepest, " degrees", "; tilt the body less")
+        furthest_lift = 0.05  # m
+        if not (np.isfinite(self.offset).all() and abs(self.lift) <= furthest_lift):
             raise ValueError(
                 f"offset {self.offset} m and lift {self.lift} m: the body must lie within "
-                f"{1e3 * FURTHEST_LIFT:g} mm of the focus; change the height of the focus "
+                f"{1e3 * furthest_lift:g} mm of the focus; change the height of the focus "
                 "instead"
             )
 
@@ -134,8 +136,6 @@ class Placement:
         return points @ self.rotation.T + [*self.offset, self.lift]
 
 
-STEEPEST = 60.0 + 1e-9  # degrees: almost no pressure acts on steeper bodies
-FURTHEST_LIFT = 0.05  # m
 FLAT = Placement()
 
 

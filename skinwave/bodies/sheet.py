@@ -23,13 +23,8 @@ from skinwave.bodies.supports import Mounting, clip_lines, supported_components
 from skinwave.typing import Bools, Floats, Ints
 
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.1 %, deflection within 0.6 %
-# Thickness of the elements over the shorter side. A sheet of equal bending stiffness and mass per
-# area bends alike, and thick elements are far more accurate because thin ones lock.
-SHEET_THICKNESS = 0.01
-CLIP_THICKNESS = 0.1  # over the radius of a clip: frequencies within 0.15 % of a thin plate
 PAPER = {"depth": 1e-4, "base": "free", "sides": "clamped"}
 PAPER_SIZE = {"material": "paper-grain", "air": "free", **PAPER}
-AIR_ITERATIONS = 30  # each leaves at most a quarter of the error
 
 
 def discretise(body: Body, h: float, thickness: float | None = None) -> Discretised:
@@ -53,9 +48,13 @@ def _fixed_nodes(body: Body, mesh: TetMesh) -> Bools:
 
 def equivalent(body: Body) -> float:
     """Return the thickness in m of the mesh, small compared with the sheet and its clips."""
-    least = SHEET_THICKNESS * min(body.width, body.height)
+    # Thickness of the elements over the shorter side. A sheet of equal bending stiffness and mass
+    # per area bends alike, and thick elements are far more accurate because thin ones lock.
+    sheet_thickness = 0.01
+    least = sheet_thickness * min(body.width, body.height)
     reach = body.mounting.clip_radius if body.mounting.clips else 0.0
-    return min(least, CLIP_THICKNESS * reach) if reach else least
+    clip_thickness = 0.1  # over the radius of a clip: frequencies within 0.15 % of a thin plate
+    return min(least, clip_thickness * reach) if reach else least
 
 
 def _curl(body: Body, mesh: TetMesh) -> sparse.csr_array:
@@ -131,7 +130,8 @@ def bending_wavenumber(body: Body, frequency: float) -> float:
         return sqrt(sqrt(half**2 + mass * w**2 / D) - half)
 
     k = without_air(body.mass_per_area)
-    for _ in range(AIR_ITERATIONS if body.air and w else 0):
+    air_iterations = 30  # each leaves at most a quarter of the error
+    for _ in range(air_iterations if body.air and w else 0):
         k = without_air(body.mass_per_area + 2 * AIR_DENSITY / k)
     return k
 

@@ -16,8 +16,7 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import THINNEST, Strata
 from skinwave.bodies.parts import solid_of
 
-FINEST_HAND = 1e-3  # m: finer elements of a hand exceed the limits of its mesher
-THICKEST, AT = 0.1, 400.0  # coat over a shear wavelength at Hz, the highest lines of Tactons
+AT = 400.0  # coat over a shear wavelength at Hz, the highest lines of Tactons
 
 
 def check_mesh(body: Body, h: float) -> None:
@@ -69,10 +68,11 @@ def check_element_size(body: Body, h: float, slack: float = 1.0) -> float:
 def _check_layers(body: Body, h: float, slack: float) -> None:
     """Refuse layers that elements cannot resolve and that cannot be a coat."""
     coarsest = coarsest_size(body)
-    is_hopeless = coarsest < FINEST_HAND * (1 - 1e-9)
+    finest_hand = 1e-3  # m: finer elements of a hand exceed the limits of its mesher
+    is_hopeless = coarsest < finest_hand * (1 - 1e-9)
     if not is_hopeless and h <= slack * coarsest * (1 + 1e-9):
         return
-    size = FINEST_HAND if is_hopeless else h
+    size = finest_hand if is_hopeless else h
     too_thick = " and too thick for a coat" if body.of_kind.may_be_coated else ""
     smaller = "" if is_hopeless else f"elements of {1e3 * coarsest:g} mm, "
     raise ValueError(
@@ -103,7 +103,8 @@ def largest_coat(body: Body) -> int:
     strata = body.strata
     slowest = np.minimum.accumulate([solid.shear_speed for _, solid in strata])
     counts = range(1, len(strata) if body.of_kind.may_be_coated else 1)
-    return max((k for k in counts if strata[k][0] <= THICKEST * slowest[k] / AT), default=0)
+    thickest = 0.1  # coat over a shear wavelength at Hz, the highest lines of Tactons
+    return max((k for k in counts if strata[k][0] <= thickest * slowest[k] / AT), default=0)
 
 
 def without_coat(strata: Strata, count: int) -> Strata:

@@ -12,13 +12,10 @@ from simple_model.choices import check_numbers, check_range, choose
 from skinwave.typing import Bools, Ints
 
 EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # axis, end
-SUPPORTS = ("clamped", "simply")
-STEEPEST = 0.05  # rise over side of a curled sheet: slopes of 0.2 at its edges
 FEWEST_COLUMNS = 3  # of nodes in a clip: fewer let the sheet turn about it
 CLIP_LINES = (0.1, 0.25, 0.5)  # of the radius of a clip: grid lines on both sides of its edges
 NEARLY = 0.01  # of the radius of a clip: lines nearer than this to another are left out
 CONDITIONS = ("clamped", "absorbing", "free")  # of a side
-BASES = (*CONDITIONS, "elastic")
 DEFAULT_SIDE = "absorbing"
 
 
@@ -74,7 +71,8 @@ def complete_sides(sides: str | Sides, known: Sequence[str], kind: str) -> str |
 
 def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> None:
     """Refuse an unknown base, and an elastic one without its stiffness in N/m3."""
-    choose("base", base, BASES)
+    bases = (*CONDITIONS, "elastic")
+    choose("base", base, bases)
     if base != "elastic":
         if stiffness:
             raise ValueError(
@@ -145,7 +143,8 @@ class Mounting:
         for edge in self.edges:
             choose("edge", edge, EDGES)
         object.__setattr__(self, "edges", tuple(edge for edge in EDGES if edge in self.edges))
-        choose("support", self.support, SUPPORTS)
+        supports = ("clamped", "simply")
+        choose("support", self.support, supports)
         numbers = ("tension_x", "tension_y", "clip_radius", "edge_loss", "frame_width")
         check_numbers("a sheet", self, *numbers, least="0 or above")
         if not (self.edges or self.clips):
@@ -215,8 +214,9 @@ def check_extent(mounting: Mounting, width: float, height: float) -> None:
     """Refuse clips outside a sheet, width and height in m, a curl that is not shallow, and a frame
     wider than the sheet and than the default.
     """
+    steepest = 0.05  # rise over side of a curled sheet: slopes of 0.2 at its edges
     for name, side in (("curl_x", width), ("curl_y", height)):
-        most = 1e3 * STEEPEST * side
+        most = 1e3 * steepest * side
         cure = ", the limits of a shallow shell; reduce it"
         check_range(name, 1e3 * getattr(mounting, name), -most, most, " mm", cure)
     if (wide := mounting.frame_width) > max(width, height, FRAME.frame_width):

@@ -17,11 +17,6 @@ from skinwave.typing import Floats, Ints
 
 HAND_CELL = 5e-3  # m: within 1.2 % of elements of 3 mm at every probe, at a third of the cost
 FINE_PALM = 2e-3  # m: smallest default elements of a palm with thin layers, 300,000 dofs
-# Cosine between the outward normal and straight down, or along the hand, at which the support
-# begins and is complete. Between 0.5 and 0.9, it would rise within less than an element at the rim
-# of a palm, and meshes of 5 mm differ by 2.9 %. Between 0.2 and 1, they differ by 1.4 %.
-BEGINS, ENTIRE = 0.2, 1.0
-STIFFEST = 1e6  # stiffness of bone, over the shear stiffness of the whole thickness
 
 
 def hand_size(body: Body) -> float:
@@ -65,10 +60,11 @@ def support(
     """
     below = [] if "bottom" in mesh.facets else [(body.base, -outward[:, 2])]
     stiffness, absorbed = np.zeros((2, len(outward)))
+    stiffest = 1e6  # stiffness of bone, over the shear stiffness of the whole thickness
     for end, cosine in [*below, *ends]:
         share = supported_share(cosine)
         if end == "clamped":
-            stiffness += _shear_stiffness(body, mesh) * share / (1 - share + 1 / STIFFEST)
+            stiffness += _shear_stiffness(body, mesh) * share / (1 - share + 1 / stiffest)
         elif end == "elastic":
             stiffness += body.base_stiffness * share
         elif end == "absorbing":
@@ -80,7 +76,11 @@ def supported_share(cosine: Floats) -> Floats:
     """Return the share, from 0 to 1, of a support where its direction and the outward normal of the
     surface have a cosine.
     """
-    t = np.clip((cosine - BEGINS) / (ENTIRE - BEGINS), 0.0, 1.0)
+    # Cosine between the outward normal and straight down, or along the hand, at which the support
+    # begins and is complete. Between 0.5 and 0.9, it would rise within less than an element at the
+    # rim of a palm, and meshes of 5 mm differ by 2.9 %. Between 0.2 and 1, they differ by 1.4 %.
+    begins, entire = 0.2, 1.0
+    t = np.clip((cosine - begins) / (entire - begins), 0.0, 1.0)
     return np.asarray(t * t * (3 - 2 * t))
 
 
