@@ -16,8 +16,6 @@ from skinwave.typing import Floats
 
 AS_GOOD = 10.83  # of chi-square: 99.9 % of one degree of freedom
 PRIOR_FREEDOM = 20.0  # degrees of freedom of the variance that all lines share
-MISFIT = 3.0  # chi-square over its degrees of freedom, above which a model leaves more than noise
-NEARLY = 1.3  # ratio of residuals of nearly equal delays, if the model misfits
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -176,7 +174,10 @@ def _best_delay(
     if np.isfinite(lines.variance).any():  # the noise is known
         scale = max(scale, 1.0)
     most = left.min() + AS_GOOD * scale + 1e-9 * np.abs(left).max()
-    alike = delays[left <= max(most, NEARLY * left.min() * (scale > MISFIT))]
+    # Chi-square over its degrees of freedom, above which a model leaves more than noise.
+    misfit = 3.0
+    nearly = 1.3  # ratio of residuals of nearly equal delays, if the model misfits
+    alike = delays[left <= max(most, nearly * left.min() * (scale > misfit))]
     chosen = float(alike[np.argmin(np.abs(alike))])
     away = np.abs(alike - chosen)
     return chosen, float(away[away > 1e-9 * window].min(initial=np.inf))

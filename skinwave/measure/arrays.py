@@ -36,13 +36,7 @@ STARTS = ("t0", "t_start", "tstart", "start_time", "x0")
 INTERVALS = ("dt", "sampling_interval")
 PLACES = ("places", "points", "probes", "xy", "xyz", "positions", "coordinates", "locations")
 MILLIMETRES = tuple(f"{name}_mm" for name in PLACES)
-FARTHEST = 5.0  # m, of a place; beyond it the unit is not the metre
 DRIVES = ("drive", "ref", "reference", "r", "trigger")
-MOTION = {name: quantity for quantity in units.MOTION for name in NAMES[quantity]} | dict.fromkeys(
-    ("values", "y", "data", "signal", "signals"), ""
-)
-NOT_MOTION = (*TIMES, *FREQUENCIES, *RATES, *INTERVALS, *STARTS, *PLACES, *MILLIMETRES, *DRIVES,
-              "quantity", "unit", "name")  # fmt: skip
 Arrays = Mapping[str, np.ndarray]
 
 
@@ -256,11 +250,16 @@ def _in_order(
 
 def _motion(arrays: Arrays) -> str:
     """Return the name of the array of motion."""
+    not_motion = (*TIMES, *FREQUENCIES, *RATES, *INTERVALS, *STARTS, *PLACES, *MILLIMETRES, *DRIVES,
+                  "quantity", "unit", "name")  # fmt: skip
     candidates = [
         name for name, array in arrays.items()
-        if array.dtype.kind in "fiuc" and array.size > 1 and _last(name) not in NOT_MOTION
+        if array.dtype.kind in "fiuc" and array.size > 1 and _last(name) not in not_motion
     ]  # fmt: skip
-    candidates = [name for name in candidates if _last(name) in MOTION] or candidates
+    motion = {
+        name: quantity for quantity in units.MOTION for name in NAMES[quantity]
+    } | dict.fromkeys(("values", "y", "data", "signal", "signals"), "")
+    candidates = [name for name in candidates if _last(name) in motion] or candidates
     if not candidates:
         raise ValueError(f"no array is motion, only {_list(arrays)}; give --variable")
     if len(candidates) > 1:
@@ -326,13 +325,14 @@ def _scalar(arrays: Arrays, names: tuple[str, ...]) -> float:
 
 def _places(arrays: Arrays) -> Floats:
     """Return places (p, 2) in m from the first two coordinates; (0, 2) if there are none."""
+    farthest = 5.0  # m, of a place; beyond it the unit is not the metre
     for name in (*PLACES, *MILLIMETRES):
         array = arrays.get(name, np.empty(0))
         if array.dtype.kind not in "fiu" or array.ndim != 2 or not {2, 3} & set(array.shape):
             continue
         points = (array if array.shape[1] in (2, 3) else array.T)[:, :2].astype(np.float64)
         points = points / 1e3 if name in MILLIMETRES else points
-        if (largest := np.nanmax(np.abs(points), initial=0.0)) > FARTHEST:
+        if (largest := np.nanmax(np.abs(points), initial=0.0)) > farthest:
             raise ValueError(
                 f"'{name}' reaches {largest:g} m; name it 'places_mm', or give --places"
             )

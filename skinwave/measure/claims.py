@@ -20,12 +20,7 @@ from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "cannot be decided"
-CONFIDENCE = 0.95  # that all true amplitudes are within their bounds
-OF_SEVERAL = "M2"  # the claim about several paths
 OF_PEAKS = ("S2", "S5")  # claims about the frequencies of peaks
-PRESENT = {  # lines that a claim expects, while others are to be weak
-    "S3": PAIRS, "M1": ("2f_AM", "3f_AM"), "M3": ("f_d", "2f_AM"),
-}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +41,8 @@ def by_name(
 ) -> LinesByName:
     """Return lines at the probes of a scene by all names; `names` maps first names to all."""
     size = np.abs(lines.mean)
-    radius = lines.radius(1 - (1 - CONFIDENCE) / max(size.size, 1))
+    confidence = 0.95  # that all true amplitudes are within their bounds
+    radius = lines.radius(1 - (1 - confidence) / max(size.size, 1))
     every = [(name, k) for k, aliases in enumerate(names.values()) for name in aliases]
     return LinesByName(
         tacton=scene.name, scene=scene, places=scene.probe_points,
@@ -100,7 +96,8 @@ def _assess(
 
 def _undecidable(measured: LinesByName, claim: str) -> str:
     """Return why a claim cannot be assessed, or ""."""
-    if claim == OF_SEVERAL:
+    of_several = "M2"  # the claim about several paths
+    if claim == of_several:
         return "the claim is about several paths, and the record has one"
     if not is_resolved(measured, claim):
         lost = ", ".join(measured.unresolved) or "its lines"
@@ -120,10 +117,14 @@ def _vary(measured: LinesByName, claim: str, way: int, am: int) -> LinesByName:
     """Return amplitudes varied within the noise for a claim (way 1) or against it (-1)."""
     of_am = measured.frequencies["f_AM"]
 
+    present = {  # lines that a claim expects, while others are to be weak
+        "S3": PAIRS, "M1": ("2f_AM", "3f_AM"), "M3": ("f_d", "2f_AM"),
+    }  # fmt: skip
+
     def sign(name: str) -> int:
         if measured.frequencies[name] == of_am:
             return am
-        return way if name in PRESENT.get(claim, ()) else -way
+        return way if name in present.get(claim, ()) else -way
 
     return replace(measured, lines={
         name: np.maximum(a + sign(name) * measured.radius[name], 0.0)

@@ -31,14 +31,12 @@ from skinwave.results.run import ASSESSED, Run, own_names
 from skinwave.scene.scene import Scene, check_motion
 from skinwave.typing import Floats
 
-LEAST_OVERLAP = 0.75  # of the shorter one of record and Tacton
 LEVEL = 0.05  # probability that any difference is declared where there is none
 AGREES, DIFFERS, NUMERICAL, NO_LINE, UNKNOWN = (
     "within the noise", "beyond the noise", "beyond the noise, within the numerical error",
     "no line above the noise", "noise unknown",
 )  # fmt: skip
 MEASURED = "measured"  # body and model of the measurement in figures
-MOST_DRAWN = 8  # places
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,7 +118,8 @@ class MeasuredComparison:
     @property
     def figure_places(self) -> np.ndarray:
         """Indices of the places that figures show: those with the strongest lines."""
-        return strongest(np.linalg.norm(self.lines.mean, axis=0), MOST_DRAWN)
+        most_drawn = 8  # places
+        return strongest(np.linalg.norm(self.lines.mean, axis=0), most_drawn)
 
 
 def compare_measured(measured: Measured, runs: Sequence[Run]) -> MeasuredComparison:
@@ -209,7 +208,8 @@ def _delay_window(measurement: Measurement, run: Run, lines: MeasuredLines) -> t
     if measurement.is_spectrum:
         return 2 * max(end - begin, period), 0.0
     first, last = (float(t) for t in measurement.times[[0, -1]])
-    within = LEAST_OVERLAP * min(last - first, end - begin)
+    least_overlap = 0.75  # of the shorter one of record and Tacton
+    within = least_overlap * min(last - first, end - begin)
     low, high = first + within - end, last - within - begin
     return max(high - low, period), (low + high) / 2
 

@@ -28,14 +28,6 @@ from skinwave.results.claims import TEXTS
 from skinwave.system.document import Details, Part, Picture, Section
 from skinwave.system.table import Column, Table
 
-SAFE_OVERLAP = 0.85  # of the shorter one of record and Tacton
-LEAST_CHANGE = 0.2  # of a line between the halves of the record, that is reported
-MOST_NAMED = 3  # lines in a sentence
-MOST_ROWS = 30  # differences on the page; measured.csv has all
-CAPTION = (
-    f"The {MOST_LINES} strongest lines. Models have the fitted, or given, delay and gain. Filled "
-    "markers: the difference in amplitude and phase is beyond the noise."
-)
 METHOD = (
     "Lines are fitted to each repetition by least squares. Gain and delay of each model follow "
     "from all lines and places, weighted by noise. Their standard errors contain noise and a "
@@ -43,14 +35,6 @@ METHOD = (
     "is beyond the noise if its p-value, adjusted for the number of lines and "
     f"places (Holm), is below {100 * LEVEL:g} % (Victor & Mast 1991). The point kernels are "
     "pressures, and their gain has that unit."
-)
-NO_CLAIMS = (
-    "The claims concern a single focus that is modulated by at most one tone, moves along a closed "
-    "path, or both. This Tacton is different."
-)
-ABOUT_CLAIMS = (
-    "From the data alone. A claim holds, or fails, if every set of amplitudes within the noise "
-    "says so (95 % for all together)."
 )
 
 
@@ -68,18 +52,31 @@ def page_section(
     )  # fmt: skip
     largest = np.argsort(-np.abs(lines.mean - main.model), axis=None, kind="stable")
     rows, unit = list(_rows(comparison, main)), comparison.measurement.record.column
+    most_rows = 30  # differences on the page; measured.csv has all
     differences = Table(_columns(comparison), [rows[k] for k in largest]).only(
         "line", "frequency_hz", "x_mm", "y_mm", f"measured_{unit}", f"measured_{unit}_error",
         f"model_{unit}", f"difference_{unit}", "phase_off_deg", "p_adjusted", "finding",
-        most=MOST_ROWS,
+        most=most_rows,
     )  # fmt: skip
+    no_claims = (
+        "The claims concern a single focus that is modulated by at most one tone, moves along a "
+        "closed path, or both. This Tacton is different."
+    )
+    about_claims = (
+        "From the data alone. A claim holds, or fails, if every set of amplitudes within the noise "
+        "says so (95 % for all together)."
+    )
     claims: list[Part] = (
-        [ABOUT_CLAIMS, claims_table(comparison)] if comparison.claims else [NO_CLAIMS]
+        [about_claims, claims_table(comparison)] if comparison.claims else [no_claims]
+    )
+    caption = (
+        f"The {MOST_LINES} strongest lines. Models have the fitted, or given, delay and gain. "
+        "Filled markers: the difference in amplitude and phase is beyond the noise."
     )
     return Section("Comparison with the measurement", [
         *(conclusion(comparison, column) for column in comparison.bodies),
         *remarks(comparison),
-        picture("measured", figure, CAPTION),
+        picture("measured", figure, caption),
         columns_table(comparison),
         METHOD,
         Details(f"Largest differences of the {label(main.run.column)}, line by line",
@@ -217,7 +214,8 @@ def _where(comparison: MeasuredComparison, column: ModelColumn) -> str:
     away = np.where(beyond, np.abs(comparison.lines.mean - column.model), 0).max(axis=1)
     lines = [k for k in np.argsort(-away, kind="stable") if beyond[k].any()]
     names, places = list(comparison.names), beyond.shape[1]
-    shown = [f"{names[k]} at {beyond[k].sum()} of {places} places" for k in lines[:MOST_NAMED]]
+    most_named = 3  # lines in a sentence
+    shown = [f"{names[k]} at {beyond[k].sum()} of {places} places" for k in lines[:most_named]]
     more = len(lines) - len(shown)
     return ", ".join(shown) + (f" and {plural(more, 'more line')}" if more else "")
 
@@ -237,7 +235,8 @@ def remarks(comparison: MeasuredComparison) -> list[str]:
         unresolved = ", ".join(comparison.unresolved)
         sentences.append(f"Not compared, because record or model is too short: {unresolved}.")
     errors = np.zeros(len(lines.frequencies))
-    changes = unsteady(measurement, list(comparison.names), lines.frequencies, errors, LEAST_CHANGE)
+    least_change = 0.2  # of a line between the halves of the record, that is reported
+    changes = unsteady(measurement, list(comparison.names), lines.frequencies, errors, least_change)
     more = (*changes, *flaws(measurement, comparison.scene.pressure), *measurement.remarks)
     return sentences + [as_sentence(sentence) for sentence in more]
 
@@ -259,7 +258,8 @@ def _outside(comparison: MeasuredComparison, column: ModelColumn) -> list[str]:
         return []
     delay, duration = column.alignment.delay, float(np.ptp(comparison.measurement.times))
     inside = overlap(comparison.measurement, column.run, delay)
-    if inside > SAFE_OVERLAP * min(duration, float(np.ptp(column.run.response.times))):
+    safe_overlap = 0.85  # of the shorter one of record and Tacton
+    if inside > safe_overlap * min(duration, float(np.ptp(column.run.response.times))):
         return []
     return [
         f"At a delay of {1e3 * delay:.3g} ms, only {1e3 * max(inside, 0.0):.3g} of the "

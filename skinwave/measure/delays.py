@@ -8,13 +8,6 @@ from scipy.special import fdtrc
 from simple_model.spectra import cosines
 from skinwave.typing import Floats
 
-TRIALS_PER_PERIOD = 8  # of the highest line
-MOST_TRIALS = 2**21
-NEWTON_STEPS = 5
-OUT_OF_STEP = 1e-3  # p-value below which repetitions are shifted
-LEAST_OVERLAP = 0.5  # of the samples
-LEAST_CORRELATION = 0.8  # of references of one signal
-LEAST_FRACTION = 0.01  # samples; smaller fractions of a delay are round-off
 NOT_SIMULTANEOUS = (
     "the file has no reference for each place: places are taken as simultaneous, and phases "
     "between them are wrong unless one trigger started all"
@@ -38,7 +31,9 @@ def maxima(frequencies: Floats, products: np.ndarray, window: float) -> tuple[Fl
     highest = float(frequencies.max(initial=0.0))
     if not (highest > 0 and window > 0 and np.abs(products).sum() > 0):
         return np.zeros(1), correlation(frequencies, products, np.zeros(1))
-    n = int(min(np.ceil(TRIALS_PER_PERIOD * highest * window), MOST_TRIALS)) | 1
+    trials_per_period = 8  # of the highest line
+    most_trials = 2**21
+    n = int(min(np.ceil(trials_per_period * highest * window), most_trials)) | 1
     step = window / max(n - 1, 1)
     trials = (np.arange(-1, n + 1) - (n - 1) / 2) * step
     blocks = np.array_split(trials, 1 + n // 4096)
@@ -52,7 +47,8 @@ def maxima(frequencies: Floats, products: np.ndarray, window: float) -> tuple[Fl
 
 def _refine(frequencies: Floats, products: np.ndarray, delays: Floats, step: float) -> Floats:
     """Return the maxima of the correlation next to delays (k,), by Newton's method."""
-    for _ in range(NEWTON_STEPS):
+    newton_steps = 5
+    for _ in range(newton_steps):
         slope, bend = (correlation(frequencies, products, delays, n) for n in (1, 2))
         move = np.where(bend < 0, -slope / np.where(bend < 0, bend, -1.0), 0.0)
         delays = delays + np.clip(move, -step, step)
@@ -88,8 +84,9 @@ def in_step(each: np.ndarray, frequencies: Floats) -> tuple[np.ndarray, Floats]:
     choices = 2 * period * float(frequencies.max())
     power = float((weights * np.abs(shifted) ** 2).sum())
     in_common = 1 - float(after) / power if power > 0 else 0.0
+    out_of_step = 1e-3  # p-value below which repetitions are shifted
     # Delays align even noise in part.
-    if chance * choices ** (r - 1) < OUT_OF_STEP and in_common > (1 + 1 / r) / 2:
+    if chance * choices ** (r - 1) < out_of_step and in_common > (1 + 1 / r) / 2:
         return shifted, shifts
     return unshifted
 
@@ -120,7 +117,8 @@ def align_by_references(values: Floats, references: Floats) -> tuple[Floats, Flo
     lags, count = _lags(references), values.shape[1]
     begin = lags - lags.min()
     left = count - int(np.ceil(begin.max()))
-    if left < LEAST_OVERLAP * count:
+    least_overlap = 0.5  # of the samples
+    if left < least_overlap * count:
         return values, np.empty(0), (
             f"places are not aligned in time: their references are {begin.max():.0f} samples apart"
         )  # fmt: skip
@@ -128,7 +126,8 @@ def align_by_references(values: Floats, references: Floats) -> tuple[Floats, Flo
     centred = drives - drives.mean(axis=1, keepdims=True)
     centred /= np.linalg.norm(centred, axis=1, keepdims=True) + np.finfo(float).tiny
     alike = np.einsum("t,rtp->rp", centred[0, :, 0], centred).min()
-    if alike < LEAST_CORRELATION:
+    least_correlation = 0.8  # of references of one signal
+    if alike < least_correlation:
         return values, np.empty(0), (
             f"places are not aligned in time: their references have a correlation of {alike:.2g}; "
             "phases between places are unknown"
@@ -144,6 +143,7 @@ def _lags(references: Floats) -> Floats:
     centred = references - references.mean(axis=1, keepdims=True)
     n, first = centred.shape[1], centred[0, :, 0]
     lags = np.zeros((centred.shape[0], centred.shape[2]))
+    least_fraction = 0.01  # samples; smaller fractions of a delay are round-off
     for r, p in np.ndindex(*lags.shape):
         one = centred[r, :, p]
         lag = int(np.argmax(correlate(one, first, method="fft"))) - (n - 1)
@@ -152,7 +152,7 @@ def _lags(references: Floats) -> Floats:
         cross = np.fft.rfft(window * b) * np.fft.rfft(window * a).conj()
         cycles = np.asarray(np.fft.rfftfreq(len(a)), np.float64)
         fraction = float(_refine(cycles, cross, np.zeros(1), 1.0)[0])
-        lags[r, p] = lag + (fraction if LEAST_FRACTION < abs(fraction) < 1 else 0.0)
+        lags[r, p] = lag + (fraction if least_fraction < abs(fraction) < 1 else 0.0)
     return lags
 
 

@@ -13,10 +13,6 @@ from skinwave.measure.misfit import NOT_DESCRIBED
 from skinwave.measure.observed import first_names
 from skinwave.measure.parameters import DELAY
 
-LEAST_SHARE = 1e-3  # of the measured power in lines that are not fitted
-LEAST_PROBABILITY = 1e-9  # that is shown
-CORRELATED = 0.1  # smallest correlation that is mentioned
-
 
 def sentences(result: Fit) -> list[str]:
     """Return sentences on the fitted keys and the quality of the fit."""
@@ -85,7 +81,8 @@ def _of_solution(result: Fit) -> Iterator[str]:
             f"{missed} of {count} starts ended at a larger misfit, so a better solution may exist; "
             "give more --starts"
         )
-    if (share := sum(line.share for line in strong)) > LEAST_SHARE:
+    least_share = 1e-3  # of the measured power in lines that are not fitted
+    if (share := sum(line.share for line in strong)) > least_share:
         yield (
             f"the lines {first_names(tuple(line.name for line in strong))} are not fitted: they "
             f"have {percent(share)} of the measured power, but are negligible in the model; check "
@@ -131,7 +128,8 @@ def _undetermined_keys(key: str) -> str:
 
 def probability(p: float) -> str:
     """Return a probability with = or <."""
-    return f"= {significant(p, 2)}" if p >= LEAST_PROBABILITY else f"< {LEAST_PROBABILITY:g}"
+    least_probability = 1e-9  # that is shown
+    return f"= {significant(p, 2)}" if p >= least_probability else f"< {least_probability:g}"
 
 
 def notes(result: Fit) -> list[str]:
@@ -150,7 +148,8 @@ def notes(result: Fit) -> list[str]:
     correlations = np.nan_to_num(result.intervals.correlations)
     table = np.where(np.outer(is_part, is_part), correlations, 0.0)
     np.fill_diagonal(table, 0.0)
-    if (largest := float(np.abs(table).max())) >= CORRELATED:
+    correlated = 0.1  # smallest correlation that is mentioned
+    if (largest := float(np.abs(table).max())) >= correlated:
         sentences.append(
             f"correlations of the estimates, up to {significant(largest, 2)}, are dropped"
         )

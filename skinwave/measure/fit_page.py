@@ -33,26 +33,7 @@ from skinwave.system.document import (
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
-INK, FITTED, RESIDUAL = "#222222", BLUE, ORANGE
-MOST_DRAWN = 4  # places
-DRAWN_TIME = 0.05  # s of waveforms
-NORMAL_95 = 1.96
-ABOUT_INTERVALS = (
-    "A 95 % interval contains the true value in 95 of 100 measurements, if the model is correct "
-    "and the residuals are noise. A misfit beyond the noise widens it, as a systematic error."
-)
-ABOUT_WAVEFORMS = "Grey: measured; blue: fitted; orange: measured minus fitted."
-ABOUT_LINES = (
-    "The strongest lines of the load, measured and fitted, at the places with the largest motion. "
-    "Filled markers: the difference exceeds 95 % of the noise."
-)
-ABOUT_RESIDUALS = (
-    "Residuals over their standard error. For normal errors, 95 % lie between the dashed lines."
-)
-ABOUT_LAGS = " Right: their autocorrelation; white residuals lie in the shaded band."
-ABOUT_CORRELATIONS = (
-    "Correlations of the estimates. Near ±1, one parameter can compensate the other."
-)
+FITTED, RESIDUAL = BLUE, ORANGE
 
 
 def write(folder: Path, result: Fit) -> None:
@@ -68,21 +49,38 @@ def write(folder: Path, result: Fit) -> None:
         fitted=result.prediction, residual=result.solution.residual, correlations=correlations,
         places_m=result.measured.places, keys=np.array(keys),
     )  # fmt: skip
-    about = ABOUT_RESIDUALS + ABOUT_LAGS * bool(len(result.intervals.whiteness.correlations))
-    caption = ABOUT_WAVEFORMS if data.is_in_time else ABOUT_LINES
+    about_residuals = (
+        "Residuals over their standard error. For normal errors, 95 % lie between the dashed lines."
+    )
+    about_lags = " Right: their autocorrelation; white residuals lie in the shaded band."
+    about = about_residuals + about_lags * bool(len(result.intervals.whiteness.correlations))
+    about_waveforms = "Grey: measured; blue: fitted; orange: measured minus fitted."
+    about_lines = (
+        "The strongest lines of the load, measured and fitted, at the places with the largest "
+        "motion. Filled markers: the difference exceeds 95 % of the noise."
+    )
+    caption = about_waveforms if data.is_in_time else about_lines
     model, starts, residual, *_ = sentences(result)
     estimates = [_estimate_text(e) for e in result.estimates if e.is_resolved and not e.at_limit]
+    about_intervals = (
+        "A 95 % interval contains the true value in 95 of 100 measurements, if the model is "
+        "correct and the residuals are noise. A misfit beyond the noise widens it, as a "
+        "systematic error."
+    )
     parts: list[Part] = [
-        _interval_table(result), f"{model} {starts} {ABOUT_INTERVALS}",
+        _interval_table(result), f"{model} {starts} {about_intervals}",
         Picture(png(fitted_figure(result)), caption, "fitted"),
         Section("Residuals", [
             _whiteness(result), Picture(png(residual_figure(result)), about, "residuals"),
         ]),
     ]  # fmt: skip
+    about_correlations = (
+        "Correlations of the estimates. Near ±1, one parameter can compensate the other."
+    )
     if len(keys) > 1:
         rows = ((key, *row) for key, row in zip(keys, correlations.tolist(), strict=True))
         table = Table(("", *(Column(key, digits=2) for key in keys)), rows)
-        parts.append(Section("Correlations", [ABOUT_CORRELATIONS, table]))
+        parts.append(Section("Correlations", [about_correlations, table]))
     parts.append(Details("The scene with the estimates", [preformat(text)]))
     Report(
         f"{result.target.scene.name} fitted to {result.measured.name or 'a measurement'}",
@@ -184,7 +182,8 @@ def fitted_figure(result: Fit) -> Figure:
         return _waveforms(result)
     measured, fitted = (_amplitudes(x, count) for x in (data.values, result.prediction))
     at, error = _largest(measured), data.error[:, :count]
-    differs = np.abs(measured - fitted) > NORMAL_95 * error
+    normal_95 = 1.96
+    differs = np.abs(measured - fitted) > normal_95 * error
     return lines_figure(
         dict(zip(data.lines, data.axis.tolist(), strict=True)), result.measured.places[at],
         measured[:, at], error[:, at], {"fitted": fitted[:, at]}, {"fitted": differs[:, at]},
@@ -196,7 +195,8 @@ def _waveforms(result: Fit) -> Figure:
     """Return the end of steady waveforms, or the start of waveforms from rest."""
     data, record = result.solution.problem.data, result.measured.record
     places, fitted = _largest(data.values), result.prediction
-    n = int(np.searchsorted(data.axis, data.axis[0] + DRAWN_TIME)) + 1
+    drawn_time = 0.05  # s of waveforms
+    n = int(np.searchsorted(data.axis, data.axis[0] + drawn_time)) + 1
     part = slice(max(len(data.axis) - n, 0), None) if data.lines else slice(n)
     t = 1e3 * data.axis[part]
     figure = Figure(figsize=REPORT.size(10.5, 1.5 * len(places) + 0.9), layout="constrained")
@@ -223,7 +223,8 @@ def _amplitudes(values: Floats, places: int) -> np.ndarray:
 
 
 def _largest(values: np.ndarray) -> np.ndarray:
-    return strongest((np.abs(values) ** 2).sum(axis=0), MOST_DRAWN)
+    most_drawn = 4  # places
+    return strongest((np.abs(values) ** 2).sum(axis=0), most_drawn)
 
 
 @mpl.rc_context(REPORT.rc)
@@ -237,13 +238,14 @@ def residual_figure(result: Fit) -> Figure:
     widths = (2, 1)[: 1 + bool(len(each))]
     left, *others = figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0]
     thin = slice(None, None, max(1, len(residual) // 2000))
+    ink = "#222222"
     left.plot(scale * data.axis[thin], residual[thin], ".", ms=2 if data.is_in_time else 5,
-              color=INK, alpha=0.4)  # fmt: skip
+              color=ink, alpha=0.4)  # fmt: skip
     for y in (-2, 2):
         left.axhline(y, color=RESIDUAL, lw=0.8, ls="--")
     left.set(xlabel=label, ylabel="residual, standard errors")
     for right in others:
-        right.bar(np.arange(1, len(each) + 1), each, color=INK, alpha=0.6)
+        right.bar(np.arange(1, len(each) + 1), each, color=ink, alpha=0.6)
         right.axhspan(-band, band, color=FITTED, alpha=0.2)
         right.set_xlabel("lag, samples" if data.is_in_time else "lag, lines")
         right.set_ylabel("autocorrelation")

@@ -15,7 +15,6 @@ from skinwave.measure.units import ANGLES, LENGTHS, MOTION, TIMES, canonical, qu
 
 TIME, FREQUENCY, X, Y, Z = "time", "frequency", "x", "y", "z"
 REPETITION, DRIVE, INDEX = "repetition", "drive", "index"
-NOT_MOTION = (TIME, FREQUENCY, X, Y, Z, REPETITION, DRIVE, INDEX)
 COUNT_UNIT = "Sequence"  # Rigol's unit of a row number
 NAMES = {
     TIME: (
@@ -51,7 +50,6 @@ _HEADING = re.compile(
     r"(?:\[(?P<unit>[^\]]*)\]|\((?P<round>(?:[^(),]|\([^()]*\))*)\))?"
 )
 UNITS = {unit for known in (TIMES, units.FREQUENCIES, *MOTION.values(), ANGLES) for unit in known}
-_SUFFIXES = {unit.replace("/", "_"): unit for unit in UNITS - {"in"}}  # as in "signal_in"
 UNITS |= {canonical(unit) for unit in UNITS} | {
     "V", "mV", "uV", "N", "mN", "Pa", "kPa", "A", "mA", "%", "EU", "a.u.", COUNT_UNIT, "dB", "",
 }  # fmt: skip
@@ -73,7 +71,8 @@ class Column:
     @property
     def may_be_motion(self) -> bool:
         """Whether the column may hold measured motion."""
-        return self.role not in NOT_MOTION
+        not_motion = (TIME, FREQUENCY, X, Y, Z, REPETITION, DRIVE, INDEX)
+        return self.role not in not_motion
 
     @property
     def is_motion(self) -> bool:
@@ -144,9 +143,10 @@ def _role(name: str, unit: str) -> str:
 def _split_suffix(name: str) -> tuple[str, str]:
     """Split a name such as "velocity_mm_s" into name and unit, the longest possible."""
     parts = name.split("_")
+    suffixes = {unit.replace("/", "_"): unit for unit in UNITS - {"in"}}  # as in "signal_in"
     for k in range(1, len(parts)):
         suffix = "_".join(parts[k:])
-        if unit := next((u for s, u in _SUFFIXES.items() if s.lower() == suffix), ""):
+        if unit := next((u for s, u in suffixes.items() if s.lower() == suffix), ""):
             return "_".join(parts[:k]), unit
     return name, ""
 

@@ -23,22 +23,13 @@ from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import noise_floor
 from skinwave.typing import Floats
 
-MOST_VALUES = 2_000_000  # that are searched for lines
-MOST_SAMPLES = 100_000  # of a waveform
-FEWEST_BINS = 64  # equally spaced frequencies of a spectrum with a noise floor
-UNSTEADY_CHANCE = 0.01  # that a steady motion is called unsteady
 TURN_ERRORS = 2.0  # standard errors of a frequency, whose turn of phase is ignored
-SAME_LINE = 4.0  # standard errors between two estimates of one line
 
 MAINS = (50.0, 60.0)  # Hz
 MAINS_WANDER = 0.004  # of its frequency
-MOST_HUM, MOST_HUM_ON_LOAD = 20, 7  # multiples of the mains frequency
 STRONG = 1e-2  # of the strongest line of the load, for which hum may be mistaken
 
-RUN, FEWEST_RUNS = 3, 2  # clipped samples in a row at an extreme, and how many such runs,
-LONG_RUN = 20  # or one run
 BAND = 0.005  # of the half range, next to the extreme
-EXCESS = 6.0  # times the samples in the band; a rounded sinusoid has at most 2.4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,10 +72,12 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
         missing.append("one repetition: repeatability is unknown")
     constant = np.flatnonzero(np.ptp(measured.values, axis=1).max(axis=0) == 0)
     kept = varying = np.setdiff1d(np.arange(len(measured.places)), constant)
+    most_samples = 100_000  # of a waveform
     # As in a comparison, the first quarter is not used: a motion may begin there.
-    stop = min(len(measured.axis), MOST_SAMPLES)
+    stop = min(len(measured.axis), most_samples)
     part = slice(0 if measured.is_spectrum else int(SETTLE * stop), stop)
-    most = max(1, MOST_VALUES // ((stop - part.start) * len(measured.values)))
+    most_values = 2_000_000  # that are searched for lines
+    most = max(1, most_values // ((stop - part.start) * len(measured.values)))
     if len(varying) > most:
         kept = varying[np.linspace(0, len(varying) - 1, most).astype(int)]
         missing.append(f"lines were searched at {len(kept)} of {len(varying)} places")
@@ -145,7 +138,8 @@ def unsteady(
     size = np.linalg.norm(amplitudes, axis=1)
     share = np.linalg.norm(change, axis=1) / size
     turn = np.pi * (1 - SETTLE) * count / measured.rate * errors
-    is_sure = (holm(both.p_values(change)) < UNSTEADY_CHANCE).any(axis=1)
+    unsteady_chance = 0.01  # that a steady motion is called unsteady
+    is_sure = (holm(both.p_values(change)) < unsteady_chance).any(axis=1)
     beyond = np.flatnonzero(is_sure & (share > np.maximum(TURN_ERRORS * turn, least)))
     if not len(beyond):
         return []
@@ -160,7 +154,8 @@ def unsteady(
 def _of_amplitudes(measured: Measurement, kept: np.ndarray, alarm: float) -> LineSpectrum | None:
     """Return the lines of spectra with equally spaced frequencies: maxima above the floor."""
     width, runs = bin_width(measured), len(measured.values)
-    if not width or len(measured.frequencies) < FEWEST_BINS:
+    fewest_bins = 64  # equally spaced frequencies of a spectrum with a noise floor
+    if not width or len(measured.frequencies) < fewest_bins:
         return None
     density = np.mean(np.abs(measured.values[:, :, kept]) ** 2, axis=0)
     floor = noise_floor(density, runs)
@@ -193,7 +188,8 @@ def _origins(measured: Measurement, spectrum: LineSpectrum | None, part: slice) 
 
 def _is_multiple(line: SpectralLine, base: SpectralLine, n: int, duration: float) -> bool:
     """Whether a line can be the n-th multiple of another within their errors."""
-    within = SAME_LINE * float(np.hypot(line.error, n * base.error)) + 0.05 / duration
+    same_line = 4.0  # standard errors between two estimates of one line
+    within = same_line * float(np.hypot(line.error, n * base.error)) + 0.05 / duration
     return abs(line.frequency - n * base.frequency) <= within
 
 
@@ -207,10 +203,11 @@ def hum_of(
     recorded drive and do not count. The duration is in s.
     """
     hum: dict[int, str] = {}
+    most_hum = 20  # multiples of the mains frequency
     for mains, base in _mains(lines, driven):
         for k, line in enumerate(lines):
             n = round(line.frequency / base.frequency)
-            if 1 <= n <= MOST_HUM and _is_multiple(line, base, n, duration):
+            if 1 <= n <= most_hum and _is_multiple(line, base, n, duration):
                 hum.setdefault(k, f"mains {f'{n} x ' * (n > 1)}{mains:g} Hz")
     return hum
 
@@ -248,11 +245,14 @@ def _cut_off(x: Floats) -> int:
     at_top = x == top
     edges = np.diff(np.r_[False, at_top, False].astype(int))
     lengths = np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)
-    if (lengths >= RUN).sum() < FEWEST_RUNS and lengths.max() < LONG_RUN:
+    run, fewest_runs = 3, 2  # clipped samples in a row at an extreme, and how many such runs,
+    long_run = 20  # or one run
+    if (lengths >= run).sum() < fewest_runs and lengths.max() < long_run:
         return 0
     band = min(top - BAND * np.ptp(x) / 2, x[x < top].max())
     count, below = int(at_top.sum()), int(((x < top) & (x >= band)).sum())
-    return count if count > EXCESS * below else 0
+    excess = 6.0  # times the samples in the band; a rounded sinusoid has at most 2.4
+    return count if count > excess * below else 0
 
 
 def flaws(measured: Measurement, pressure: MovingPressure) -> list[str]:
@@ -276,8 +276,10 @@ def _hum(measured: Measurement, pressure: MovingPressure) -> list[str]:
     f, names = load.frequencies[strong], np.array(load.names)[strong]
     apart = 1 / float(np.ptp(measured.times))
 
+    most_hum_on_load = 7  # multiples of the mains frequency
+
     def on(mains: float, within: float) -> np.ndarray:
-        n = np.clip(np.round(f / mains), 1, MOST_HUM_ON_LOAD)
+        n = np.clip(np.round(f / mains), 1, most_hum_on_load)
         return np.asarray(np.abs(f - n * mains) <= apart + within * n * mains)
 
     if not any(on(mains, MAINS_WANDER).any() for mains in MAINS):

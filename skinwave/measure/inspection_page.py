@@ -19,22 +19,12 @@ from skinwave.report.palette import SERIES
 from skinwave.system.document import Picture, Report, Section
 from skinwave.system.table import Column, Table, cell_text
 
-MOST_DRAWN = 4  # places
-DRAWN_TIME = 0.1  # s
-MOST_CELLS = 2_000_000  # of a CSV file
-FEWEST_ON_MAP = 3  # places
-MOST_NAMED = 12  # lines in the figure
 COLUMNS = (
     Column("frequency_hz", "line", "Hz", digits=7),
     Column("frequency_error_hz", "standard error", "Hz", digits=2), "place",
     Column("x_mm", "x", "mm"), Column("y_mm", "y", "mm"), Column("amplitude", "largest amplitude"),
     "unit", Column("false_alarm", "false alarm", digits=1), Column("what", "origin"),
 )  # fmt: skip
-CAPTION = (
-    "The places with the largest motion. Spectra: one-sided amplitude density with a Hann window, "
-    "or magnitudes; dashed: noise floor without the lines; triangles: lines, grey for mains hum. "
-    "Map: root mean square about the mean."
-)
 NO_LINES = "No line rises above the noise floor."
 METHOD = (
     "The false alarm is the probability that noise alone has any line as high in the whole file. "
@@ -48,14 +38,20 @@ def write(folder: Path, inspection: Inspection) -> None:
     """Write index.html, measured.png, found-lines.csv, measurement.npz and, if small, .csv."""
     measured = inspection.measured
     (folder / "measurement.npz").write_bytes(writing.to_npz(measured))
-    if measured.values.size <= MOST_CELLS:
+    most_cells = 2_000_000  # of a CSV file
+    if measured.values.size <= most_cells:
         (folder / "measurement.csv").write_bytes(writing.to_csv(measured))
     (folder / "found-lines.csv").write_bytes(line_table(inspection).to_csv())
     missing = [as_sentence(sentence) for sentence in inspection.missing] or ["Nothing."]
+    caption = (
+        "The places with the largest motion. Spectra: one-sided amplitude density with a Hann "
+        "window, or magnitudes; dashed: noise floor without the lines; triangles: lines, grey for "
+        "mains hum. Map: root mean square about the mean."
+    )
     Report(
         f"Inspection of {measured.name}", verdict=[" ".join(sentences(inspection))],
         parts=[
-            Picture(png(figure(inspection)), CAPTION, "measured"),
+            Picture(png(figure(inspection)), caption, "measured"),
             Section("Lines", [largest(inspection), METHOD] if inspection.lines else [NO_LINES]),
             Section("Missing or assumed", missing),
         ],
@@ -169,11 +165,13 @@ def figure(inspection: Inspection) -> Figure:
     if not measured.is_spectrum:
         moving = moving - moving.mean(axis=1, keepdims=True)
     rms = measured.record.per_unit * np.sqrt(np.mean(np.abs(moving) ** 2, axis=(0, 1)))
-    has_map = np.isfinite(measured.places).all() and len(measured.places) >= FEWEST_ON_MAP
+    fewest_on_map = 3  # places
+    has_map = np.isfinite(measured.places).all() and len(measured.places) >= fewest_on_map
     panels = (not measured.is_spectrum) + has_map
     drawn = Figure(figsize=REPORT.size(11.0, 7.4 if panels else 4.2), layout="constrained")
     grid = drawn.add_gridspec(2 if panels else 1, 2 if panels == 2 else 1)
-    at = strongest(rms[inspection.kept], MOST_DRAWN)
+    most_drawn = 4  # places
+    at = strongest(rms[inspection.kept], most_drawn)
     if not measured.is_spectrum:
         _waveforms(drawn.add_subplot(grid[0, 0]), inspection, at)
     if has_map:
@@ -194,7 +192,8 @@ def _waveforms(ax: Axes, inspection: Inspection, at: np.ndarray) -> None:
     measured, places = inspection.measured, inspection.kept[at]
     record, mean = measured.record, measured.mean - measured.mean.mean(axis=0)
     size = np.abs(mean[:, places]).max(axis=1, initial=0.0)
-    count = int(np.searchsorted(measured.times - measured.times[0], DRAWN_TIME))
+    drawn_time = 0.1  # s
+    count = int(np.searchsorted(measured.times - measured.times[0], drawn_time))
     begin = int(np.clip(int(np.argmax(size)) - count // 2, 0, max(len(size) - count, 0)))
     part = slice(begin, begin + count)
     step = 2.2 * float(size[part].max(initial=0.0)) * record.per_unit or 1.0
@@ -239,7 +238,8 @@ def _mark_lines(ax: Axes, inspection: Inspection, f: np.ndarray, level: np.ndarr
     """Draw triangles above the lines, with the frequencies of the strongest."""
     at = [int(np.searchsorted(f, line.frequency)) for line in inspection.lines]
     tops = np.array([level[max(k - 2, 0) : k + 3].max(initial=0.0) for k in at])
-    named = strongest(tops, MOST_NAMED)
+    most_named = 12  # lines in the figure
+    named = strongest(tops, most_named)
     for k, (line, origin) in enumerate(zip(inspection.lines, inspection.origins, strict=True)):
         colour = "#888888" if origin.startswith("mains") else mpl.rcParams["text.color"]
         ax.plot(line.frequency, 1.5 * tops[k], "v", ms=5, color=colour)

@@ -23,13 +23,7 @@ from skinwave.measure.search import Solution
 from skinwave.typing import Floats
 
 LEVEL = 0.95
-ROUND_OFF = 1e-7  # of the largest singular value, left by differences
-AT_LIMIT = 1e-3  # of the unit interval
 UNRESOLVED = 0.5  # of the unit interval, as half an interval
-MEMBER = 0.1  # of the largest part in a direction, of the keys that form it
-MOST_LAGS = 20  # of the test of whiteness
-NOT_WHITE = 0.01  # p-value
-CURVED = 0.3  # relative difference of the root of chi squared from that of a linear model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +57,8 @@ class Whiteness:
     @property
     def is_white(self) -> bool:
         """Whether the residuals may be white."""
-        return not self.p < NOT_WHITE
+        not_white = 0.01  # p-value
+        return not self.p < not_white
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,7 +84,8 @@ def intervals(solution: Solution) -> Intervals:
     """Return the intervals of a solution; they are symmetric in logarithms where these vary."""
     scale, shape = max(solution.scale, 1e-300), solution.residual.shape
     back, singular, vt = np.linalg.svd(solution.slopes / np.sqrt(scale), full_matrices=False)
-    singular = np.maximum(singular, ROUND_OFF * max(float(singular.max()), 1e-300))
+    round_off = 1e-7  # of the largest singular value, left by differences
+    singular = np.maximum(singular, round_off * max(float(singular.max()), 1e-300))
     moves = (vt.T / singular) @ back.T  # of the parameters by each error
     covariance = moves @ moves.T
     error = np.sqrt(np.diag(covariance))
@@ -108,6 +104,7 @@ def intervals(solution: Solution) -> Intervals:
     correlations = covariance / np.outer(error, error)
     directions = np.abs(vt[singular < 2 * width * across][::-1])
     keys = solution.problem.parameters.keys
+    member = 0.1  # of the largest part in a direction, of the keys that form it
     found = Intervals(
         estimates=tuple(
             _estimate(solution, k, half[k] * covariance[k] / covariance[k, k], width * widenings[k])
@@ -117,7 +114,7 @@ def intervals(solution: Solution) -> Intervals:
         unexplained=unexplained(misfit, beyond, solution.cost),
         correlations=np.where(hidden[:, None] | hidden, np.nan, correlations),
         unresolved=tuple(
-            tuple(keys[k] for k in np.flatnonzero(parts > MEMBER * parts.max()))
+            tuple(keys[k] for k in np.flatnonzero(parts > member * parts.max()))
             for parts in directions
         ),
     )  # fmt: skip
@@ -146,16 +143,18 @@ def _estimate(solution: Solution, k: int, to_end: Floats, away: float) -> Estima
     """Return the estimate of parameter k, whose interval ends `to_end` (k,) from the solution."""
     parameter, u, half = solution.problem.parameters.free[k], float(solution.u[k]), float(to_end[k])
     low, high, is_curved = np.nan, np.nan, False
+    curved = 0.3  # relative difference of the root of chi squared from that of a linear model
     if half < UNRESOLVED:
         low, high = max(u - half, 0.0), min(u + half, 1.0)
         ends = (solution.u - to_end, solution.u + to_end)
         is_curved = any(
-            abs(_standard_errors(solution, end) / away - 1) > CURVED
+            abs(_standard_errors(solution, end) / away - 1) > curved
             for end in ends if ((end >= 0) & (end <= 1)).all()
         )  # fmt: skip
+    at_limit = 1e-3  # of the unit interval
     return Estimate(
         key=parameter.key, value=parameter.value(u), low=parameter.value(low),
-        high=parameter.value(high), at_limit=not AT_LIMIT <= u <= 1 - AT_LIMIT,
+        high=parameter.value(high), at_limit=not at_limit <= u <= 1 - at_limit,
         is_curved=is_curved,
     )  # fmt: skip
 
@@ -179,7 +178,8 @@ def widening(residual: Floats, rows: Floats) -> Floats:
 def whiteness(residual: Floats) -> Whiteness:
     """Return the test of residuals (n, s) (Ljung and Box, Biometrika 65:297 (1978))."""
     n, series = residual.shape
-    lags = min(MOST_LAGS, n // 5)
+    most_lags = 20  # of the test of whiteness
+    lags = min(most_lags, n // 5)
     if lags < 2:
         return Whiteness(correlations=np.empty(0), p=np.nan)
     x = residual - residual.mean(axis=0)

@@ -14,9 +14,6 @@ from skinwave.measure.recording import Given, Recording, factors_in
 from skinwave.measure.table import Table, choose_columns, recording_of
 from skinwave.system.formats import MEASUREMENTS, register
 
-LARGEST = 1_000_000_000  # bytes
-AXIS_UNITS = {"Time": "s", "Frequency": "Hz"}
-
 
 def read_lvm(text: str, given: Given) -> Recording:
     """Return the recording in the text of a LabVIEW measurement file with one segment."""
@@ -37,7 +34,8 @@ def read_lvm(text: str, given: Given) -> Recording:
     at = {"No": (), "Multi": range(0, len(names) - 1, 2)}.get(x_columns, (0,))  # columns of times
     units = [*units[::2], ""] if x_columns == "Multi" else [*units, *[""] * len(names)]
     of_motion = iter(units)
-    headings = [f"{axis} [{AXIS_UNITS.get(axis, axis)}]" if k in at
+    axis_units = {"Time": "s", "Frequency": "Hz"}
+    headings = [f"{axis} [{axis_units.get(axis, axis)}]" if k in at
                 else f"{name} [{next(of_motion, '')}]" for k, name in enumerate(names)]  # fmt: skip
     columns = tuple(parse_heading(heading.removesuffix(" []")) for heading in headings)
     if x_columns != "No":
@@ -88,7 +86,8 @@ def read_tdms(path: Path, given: Given) -> Recording:
     except ImportError:
         cure = 'pip install "skinwave[measure]", or export .lvm or .csv'
         raise ValueError(f"TDMS files need npTDMS; {cure}") from None
-    with reading.open_regular(path, LARGEST):
+    largest = 1_000_000_000  # bytes
+    with reading.open_regular(path, largest):
         pass
     try:
         with warnings.catch_warnings():

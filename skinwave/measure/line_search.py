@@ -19,17 +19,9 @@ from skinwave.measure.noise_floor import false_alarm, noise_floor
 from skinwave.typing import Floats
 
 ALARM = 0.01  # probability that a file of noise has any line
-RESOLVED = 1.5  # bins; closer lines are one
 LOWEST = 4  # bins; slower motion is drift, and lines as close to half the rate are undetermined
 FEWEST = 32  # samples
 MOST_LINES = 40
-MOST_PASSES = 12
-DYNAMIC_RANGE = 1e-2  # in power; weaker lines are searched once stronger ones are fitted
-CLOSE = 4.0  # bins from a known line, where its fit may leave unknown lines
-LEAKAGE = 4.0  # times the bound of the Hann window's side lobes
-ROUND_OFF = 1e-9  # of the largest value; weaker lines are round-off
-MOST_STEPS = 12  # of Gauss-Newton
-LAST_STEP = 0.01  # of a standard error or of `LARGEST_STEP`
 LARGEST_STEP = 0.5  # bins
 
 
@@ -80,17 +72,20 @@ def find_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> LineSpec
     if count < FEWEST:
         raise ValueError(f"{count} samples are too few for a spectrum; measure {FEWEST} or more")
     x = np.moveaxis(values, 0, 1).reshape(count, runs * places)
-    least = 2 / rate * (ROUND_OFF * np.abs(values).max()) ** 2
+    round_off = 1e-9  # of the largest value; weaker lines are round-off
+    least = 2 / rate * (round_off * np.abs(values).max()) ** 2
     width, chance = rate / count, np.empty(0)
     fit = _fit_lines(x, np.empty(0), rate, np.ones((2, places)), runs)
     density = rest = _densities(fit.rest, runs, rate)
     floor = np.maximum(noise_floor(density, runs), least)
-    for _ in range(MOST_PASSES):
+    most_passes = 12
+    close = 4.0  # bins from a known line, where its fit may leave unknown lines
+    for _ in range(most_passes):
         peak, peak_chance = peaks(rest, floor, runs, alarm, fit.frequencies / width)
         if not len(peak):
             break
         away = np.abs(peak[:, None] - fit.frequencies / width).min(axis=1, initial=np.inf)
-        chosen = away >= min(CLOSE, away.max())
+        chosen = away >= min(close, away.max())
         start = np.append(fit.frequencies, peak[chosen] * width)
         chance = np.append(chance, peak_chance[chosen])
         fit = _fit_lines(x, start, rate, floor, runs)
@@ -134,10 +129,12 @@ def peaks(
     top[:LOWEST] = top[-LOWEST:] = False
     bins = np.flatnonzero(top & (least < alarm))
     size = density.max(axis=1)
-    bins = bins[size[bins] >= DYNAMIC_RANGE * size[bins].max(initial=0.0)]
+    dynamic_range = 1e-2  # in power; weaker lines are searched once stronger ones are fitted
+    bins = bins[size[bins] >= dynamic_range * size[bins].max(initial=0.0)]
     lines: list[int] = []
+    resolved = 1.5  # bins; closer lines are one
     for k in sorted(bins.tolist(), key=lambda k: -height[k]):
-        if np.abs(np.append(known, lines) - k).min(initial=np.inf) < RESOLVED:
+        if np.abs(np.append(known, lines) - k).min(initial=np.inf) < resolved:
             continue
         leaks = [density[j] * _side_lobe(abs(k - j)) for j in lines]
         if not lines or (density[k] > np.sum(leaks, axis=0))[chance[k] < alarm].any():
@@ -149,7 +146,8 @@ def peaks(
 
 def _side_lobe(bins: int) -> float:
     """Return a bound of the Hann window's power at a distance in bins, relative to the line."""
-    return 1.0 if bins < 2 else LEAKAGE / (np.pi * bins * (bins**2 - 1)) ** 2
+    leakage = 4.0  # times the bound of the Hann window's side lobes
+    return 1.0 if bins < 2 else leakage / (np.pi * bins * (bins**2 - 1)) ** 2
 
 
 def _are_significant(fit: _Fit, floor: Floats, rate: float, alarm: float) -> np.ndarray:
@@ -180,9 +178,11 @@ def _fit_lines(x: Floats, start: Floats, rate: float, floor: Floats, runs: int) 
     """
     frequencies, limit = start.copy(), LARGEST_STEP * rate / len(x)
     noise = np.tile(floor[_bins(start, x, floor, rate)], (1, runs))
-    for _ in range(MOST_STEPS):
+    most_steps = 12  # of Gauss-Newton
+    last_step = 0.01  # of a standard error or of `LARGEST_STEP`
+    for _ in range(most_steps):
         step, errors, linear, rest = _step(x, frequencies, rate, noise)
-        if (np.abs(step) < LAST_STEP * np.minimum(errors, limit)).all():
+        if (np.abs(step) < last_step * np.minimum(errors, limit)).all():
             break
         moved = frequencies + np.clip(step, -limit, limit)
         frequencies = np.clip(moved, limit, rate / 2 - limit)

@@ -23,13 +23,6 @@ from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import freedom, noise_floor
 from skinwave.typing import Floats
 
-DISAGREEMENT = 1e-3  # p-value below which repetitions do not vary as the noise floor
-LINE_WIDTH = 2  # bins of a spectrum on both sides of a line
-FEWEST_CLEAR = 4  # bins of a spectrum without lines, for a noise floor
-POOLED = 4.0  # largest degrees of freedom of the mean over places, without a floor
-FEWEST_BINS = 16  # of a spectrum; fewer are single lines
-NEAREST = 1.0  # Hz, largest distance of a spectrum's bin from a line
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredLines:
@@ -125,15 +118,17 @@ def measurable(measurement: Measurement, frequencies: Floats) -> np.ndarray:
     if not measurement.is_spectrum:
         return np.asarray((frequencies > 0) & (frequencies < 0.5 * measurement.rate))
     axis = measurement.frequencies
-    half = 0.5 * np.diff(axis).min(initial=2 * NEAREST)
+    nearest = 1.0  # Hz, largest distance of a spectrum's bin from a line
+    half = 0.5 * np.diff(axis).min(initial=2 * nearest)
     away = np.abs(frequencies[:, None] - axis).min(axis=1)
-    return np.asarray((frequencies > 0) & (away <= min(half * (1 + 1e-9), NEAREST)))
+    return np.asarray((frequencies > 0) & (away <= min(half * (1 + 1e-9), nearest)))
 
 
 def bin_width(measurement: Measurement) -> float:
     """Return the width in Hz of the bins of a spectrum; 0 for single lines and unequal bins."""
     steps = np.diff(measurement.frequencies)
-    even = len(steps) >= FEWEST_BINS and np.ptp(steps) <= 1e-3 * steps.mean()
+    fewest_bins = 16  # of a spectrum; fewer are single lines
+    even = len(steps) >= fewest_bins and np.ptp(steps) <= 1e-3 * steps.mean()
     return float(steps.mean()) if even else 0.0
 
 
@@ -169,14 +164,16 @@ def _pool_variances(each: np.ndarray, floor: Floats, degrees: Floats) -> tuple[F
     """Return variances (f, p) of the mean, and degrees (f,), from floor and repetitions."""
     runs, lines, places = each.shape
     variance, own = each.var(axis=0, ddof=1) / runs, np.full((lines, 1), 2.0 * (runs - 1))
+    disagreement = 1e-3  # p-value below which repetitions do not vary as the noise floor
+    pooled = 4.0  # largest degrees of freedom of the mean over places, without a floor
     if np.isnan(floor).all():
         prior = np.broadcast_to(variance.mean(axis=1, keepdims=True), variance.shape)
-        weight = np.minimum(POOLED, own * (places - 1))
+        weight = np.minimum(pooled, own * (places - 1))
     else:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = (variance / floor).mean(axis=1)
         chance = fdtrc(own[:, 0] * places, degrees * places, ratio)
-        agree = (np.minimum(chance, 1 - chance) > DISAGREEMENT / 2)[:, None]
+        agree = (np.minimum(chance, 1 - chance) > disagreement / 2)[:, None]
         prior, weight = floor, np.where(agree, degrees[:, None], 0.0)
         own = np.where(agree, own, own / 2)  # a varying gain has only one real part
     return (weight * prior + own * variance) / (weight + own), (weight + own)[:, 0]
@@ -240,8 +237,10 @@ def _of_spectra(measurement: Measurement, frequencies: Floats, settle: float) ->
     nearest = np.abs(frequencies[:, None] - axis).argmin(axis=1)
     kept = np.ones(len(axis))
     distance = np.abs(np.arange(len(axis))[:, None] - nearest).min(axis=1, initial=9)
-    kept[distance <= LINE_WIDTH] = 0.0
-    if not bin_width(measurement) or kept[1:].sum() < FEWEST_CLEAR:
+    line_width = 2  # bins of a spectrum on both sides of a line
+    kept[distance <= line_width] = 0.0
+    fewest_clear = 4  # bins of a spectrum without lines, for a noise floor
+    if not bin_width(measurement) or kept[1:].sum() < fewest_clear:
         variance = np.full((len(frequencies), values.shape[2]), np.nan)
         return values[:, nearest], variance, np.ones(len(frequencies)), None
     floor = noise_floor((np.abs(values) ** 2).mean(axis=0), len(values), kept)

@@ -8,11 +8,8 @@ from typing import Any
 
 import numpy as np
 
-DEEPEST = 4  # structures within each other
 HDF5 = b"\x89HDF\r\n\x1a\n"
-HEADER = 512  # bytes before HDF5 in a file of version 7.3
 DAMAGED = "the file is damaged, too large or not a MATLAB file; save fewer arrays again with -v7"
-MISSING = 'MATLAB 7.3 files need h5py; pip install "skinwave[measure]", or save with -v7'
 
 
 class Unreadable(ValueError):
@@ -22,14 +19,16 @@ class Unreadable(ValueError):
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """Return the arrays in a file by name, those of structures as "structure.field"."""
     warnings.simplefilter("ignore")  # of duplicate names
+    header = 512  # bytes before HDF5 in a file of version 7.3
     with path.open("rb") as file:
-        head = file.read(HEADER + len(HDF5))
+        head = file.read(header + len(HDF5))
     arrays: dict[str, np.ndarray] = {}
+    missing = 'MATLAB 7.3 files need h5py; pip install "skinwave[measure]", or save with -v7'
     try:
         for name, value in (_hdf5 if HDF5 in head else _mat)(path).items():
             _add(arrays, name, value, 0)
     except ImportError:
-        raise ValueError(MISSING) from None
+        raise ValueError(missing) from None
     except Unreadable:
         raise
     except Exception:  # whatever the libraries raise for damaged bytes
@@ -88,7 +87,8 @@ def _add(arrays: dict[str, np.ndarray], name: str, value: Any, depth: int) -> No
         value = value[0]
     if isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
         value = {field: [one.get(field) for one in value] for field in value[0]}
-    if isinstance(value, dict) and depth < DEEPEST:
+    deepest = 4  # structures within each other
+    if isinstance(value, dict) and depth < deepest:
         for field, one in value.items():
             _add(arrays, f"{name}.{field}", one, depth + 1)
     elif isinstance(value, list):

@@ -8,7 +8,6 @@ from simple_model.quantities import Quantity, quantity
 from skinwave.typing import Floats
 
 UNEVEN = 1e-3  # of a sampling interval, left by rounding in text files
-MOST_NAMED = 5  # places in a message
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,8 +118,9 @@ class Measurement:
 
     def place_names(self, places: np.ndarray) -> str:
         """Return the names of the first few of some places."""
-        names = ", ".join(self.place_name(int(p)) for p in places[:MOST_NAMED])
-        return names + f" and {len(places) - MOST_NAMED} more" * (len(places) > MOST_NAMED)
+        most_named = 5  # places in a message
+        names = ", ".join(self.place_name(int(p)) for p in places[:most_named])
+        return names + f" and {len(places) - most_named} more" * (len(places) > most_named)
 
 
 def strongest(size: Floats, most: int) -> np.ndarray:

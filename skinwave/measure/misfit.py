@@ -12,7 +12,6 @@ from scipy.special import fdtri, stdtrit
 
 LARGEST_MISFIT = 0.2  # of the motion, beyond the noise, with which a model describes a record
 NOT_DESCRIBED = "the model does not describe this record"
-CHANCE = 1e-3  # that noise alone leaves a misfit
 
 
 def beyond_noise(chi_squared: float, dof: float, freedom: float = np.inf) -> float:
@@ -23,7 +22,8 @@ def beyond_noise(chi_squared: float, dof: float, freedom: float = np.inf) -> flo
     """
     if not freedom > 0:
         return chi_squared
-    return max(chi_squared - dof * float(fdtri(dof, min(freedom, 1e6), 1 - CHANCE)), 0.0)
+    chance = 1e-3  # that noise alone leaves a misfit
+    return max(chi_squared - dof * float(fdtri(dof, min(freedom, 1e6), 1 - chance)), 0.0)
 
 
 def systematic(beyond: float) -> float:

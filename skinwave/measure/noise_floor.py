@@ -8,10 +8,7 @@ from scipy.special import fdtrc, gammaincinv, gammaln
 
 from skinwave.typing import Floats
 
-HALF_BAND = 0.25  # of the frequency: half-width of the band of the median,
-FEWEST, WIDEST = 10, 400  # bins, at least and at most
-ROUND_OFF = 1e-40  # of the largest density
-LEAST_KEPT = 0.5  # share of the noise that a bin next to lines must have left
+FEWEST = 10  # bins, at least and at most
 CORRELATED = 1 + 2 * (0.28 + 0.016)  # bins under a Hann window per independent bin of a median
 
 
@@ -25,7 +22,8 @@ def noise_floor(density: Floats, runs: int, kept: Floats | None = None) -> Float
     count = len(density)
     kept = np.ones(count) if kept is None else kept
     bins, knots = _noise_bins(kept), _knots(count)
-    least = ROUND_OFF * density.max(initial=0.0) + np.finfo(float).tiny
+    round_off = 1e-40  # of the largest density
+    least = round_off * density.max(initial=0.0) + np.finfo(float).tiny
     positive = np.maximum(density[bins] / kept[bins, None], least)
     level = _trend(bins, positive, count)
     flat = positive / level[bins]
@@ -55,7 +53,8 @@ def false_alarm(ratio: Floats, runs: int, bins: int) -> Floats:
 
 def _noise_bins(kept: Floats) -> np.ndarray:
     """Return the bins with enough remaining noise: at least half of those around any bin."""
-    least = np.minimum(LEAST_KEPT, median_filter(kept, 2 * FEWEST + 1))
+    least_kept = 0.5  # share of the noise that a bin next to lines must have left
+    least = np.minimum(least_kept, median_filter(kept, 2 * FEWEST + 1))
     return 1 + np.flatnonzero((kept[1:] >= least[1:]) & (kept[1:] > 0))
 
 
@@ -68,7 +67,9 @@ def _bands(knots: np.ndarray, bins: np.ndarray) -> np.ndarray:
 
 
 def _half_width(k: np.ndarray) -> np.ndarray:
-    return np.clip(HALF_BAND * k, FEWEST, WIDEST).astype(int)
+    half_band = 0.25  # of the frequency: half-width of the band of the median,
+    widest = 400  # bins, at least and at most
+    return np.clip(half_band * k, FEWEST, widest).astype(int)
 
 
 def _knots(bins: int) -> np.ndarray:

@@ -26,14 +26,7 @@ from skinwave.measure.predicted import (
 from skinwave.typing import Complex, Floats
 
 KINDS = ("waveforms", "lines", "amplitudes")
-STEADY = 1.5  # largest residual of the start of a steady record, relative to the rest
-NEGLIGIBLE_TRANSIENT = 1e-3  # of the largest motion
-LEAST_VARIANCE = 1e-3  # of a combination of lines, relative to the largest
-MOST_VALUES = 20_000_000  # of waveforms
-FOURTH_DIFFERENCE = 70.0  # sum of its squared coefficients
 WEAK = 0.05  # of the load's strongest line; weaker unresolved lines are left out
-MOST_NAMED = 3  # lines in a sentence
-NOISE_CHANCE = 0.01  # p-value of a line, below which it is more than noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,8 +142,9 @@ def _not_predicted(
     whole = max(float(np.maximum(power, 0.0).sum()), 1e-300)
     chance = lines.p_values(lines.mean)
     each = []
+    noise_chance = 0.01  # p-value of a line, below which it is more than noise
     for k in np.flatnonzero(left_out).tolist():
-        is_noise = holm(chance[k]).min(initial=1.0) >= NOISE_CHANCE  # nan if unknown
+        is_noise = holm(chance[k]).min(initial=1.0) >= noise_chance  # nan if unknown
         share = 0.0 if is_noise else max(float(power[k].sum()), 0.0) / whole
         f = float(lines.frequencies[k])
         each.append(LeftOutLine(name=str(names[k]), frequency=f, share=share))
@@ -159,8 +153,9 @@ def _not_predicted(
 
 def first_names(names: tuple[str, ...]) -> str:
     """Return the first few names, and the number of the others."""
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + f" and {more} more" * (more > 0)
+    most_named = 3  # lines in a sentence
+    more = len(names) - most_named
+    return ", ".join(names[:most_named]) + f" and {more} more" * (more > 0)
 
 
 def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
@@ -206,7 +201,8 @@ def _of_moduli(correlation: Floats, a: Complex) -> Floats:
 def _whitening(correlation: Floats) -> Floats:
     """Return matrices (p, m, m) that make errors with correlations (p, m, m) independent."""
     values, vectors = np.linalg.eigh(correlation)
-    least = LEAST_VARIANCE * values.max(axis=-1, keepdims=True, initial=0.0)
+    least_variance = 1e-3  # of a combination of lines, relative to the largest
+    least = least_variance * values.max(axis=-1, keepdims=True, initial=0.0)
     return np.asarray(vectors.swapaxes(-1, -2) / np.sqrt(np.maximum(values, least))[..., None])
 
 
@@ -215,8 +211,9 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
     if measured.is_spectrum:
         raise ValueError("the measurement has spectra; fit lines or amplitudes")
     count = measured.times.size * len(measured.places)
-    if count > MOST_VALUES:
-        raise ValueError(f"{count:,} values of waveforms exceed {MOST_VALUES:,}; fit lines")
+    most_values = 20_000_000  # of waveforms
+    if count > most_values:
+        raise ValueError(f"{count:,} values of waveforms exceed {most_values:,}; fit lines")
     lines, mean = load_lines(measured, aim), measured.mean
     frequencies = lines.measured.frequencies
     rough = _of_lines("lines", measured, aim) if lines.names and not lines.unresolved else None
@@ -234,7 +231,8 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
         raise ValueError(f"the waveforms {problem}, but {aim.model} computes only the steady "
                          f"state; take another model, or {cure}")  # fmt: skip
     differences = np.diff(mean, 4, axis=0)  # nearly free of smooth motion
-    noise = np.sqrt((differences**2).mean(axis=0) / FOURTH_DIFFERENCE)
+    fourth_difference = 70.0  # sum of its squared coefficients
+    noise = np.sqrt((differences**2).mean(axis=0) / fourth_difference)
     predict = predicted_waveforms(aim, measured.times)
     return _in_time(measured, mean, predict, noise, "waveforms from rest at t = 0", rough)
 
@@ -245,7 +243,9 @@ def is_steady(measured: Measurement, frequencies: Floats) -> bool:
     n = int(SETTLE * len(rest))
     start, later = (np.sqrt((part**2).mean()) for part in (rest[:n], rest[n:]))
     largest = np.abs(measured.mean).max()
-    return bool(start <= max(STEADY * later, NEGLIGIBLE_TRANSIENT * largest))
+    steady = 1.5  # largest residual of the start of a steady record, relative to the rest
+    negligible_transient = 1e-3  # of the largest motion
+    return bool(start <= max(steady * later, negligible_transient * largest))
 
 
 def _sum_of_lines(measured: Measurement, aim: Target, frequencies: Floats) -> Predict:

@@ -44,8 +44,6 @@ from skinwave.typing import Complex, Floats
 Predict = Callable[[Values], np.ndarray]
 SAME_LINE = 1e-3  # of a frequency
 CACHED = 32  # predictions
-EXPECTED_RUNS = 200  # of a fit
-WEAKEST = 1e-5  # of the strongest line of the load; weaker ones are not predicted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +123,8 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     ranges = {key: ranges[key] for key in aim.rest(dict.fromkeys(ranges, 1.0))}
     if not aim.record.is_reduced or parameters.ties or not ranges:
         return aim
-    together = covering(aim.scene_with({}), ranges, EXPECTED_RUNS)
+    expected_runs = 200  # of a fit
+    together = covering(aim.scene_with({}), ranges, expected_runs)
     reduced = try_shared_body(together, SolveOptions(progress=progress))
     return replace(aim, reduced=reduced) if reduced else aim
 
@@ -189,12 +188,13 @@ def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
 def _flat_lines_of(scene: Scene) -> tuple[Floats, Complex]:
     """Return all lines of the normal motion at the probes: frequencies (f,), amplitudes (f, p)."""
     points = scene.probe_points
+    weakest = 1e-5  # of the strongest line of the load; weaker ones are not predicted
     if scene.load.is_plain:
         body = compliance(scene.body)
-        f, a = steady_lines(body, scene.pressure, points, threshold=WEAKEST)
+        f, a = steady_lines(body, scene.pressure, points, threshold=weakest)
         return f, a * scene.reading.record.factor(2j * np.pi * f)[:, None]
     parts = zip(fields_read(scene, 0.0), scene.loads, strict=True)
-    each = [field_lines(*part, points, threshold=WEAKEST) for part in parts]
+    each = [field_lines(*part, points, threshold=weakest) for part in parts]
     frequencies, amplitudes = zip(*each, strict=True)
     return merge_lines(np.concatenate(frequencies), np.vstack(amplitudes)[..., 0])
 

@@ -21,16 +21,7 @@ FACTOR = re.compile(  # names of numbers that scale counts
     re.IGNORECASE,
 )
 OF_COUNT = re.compile(r"(?<!full.)scal|fa[ck]tor|mult|cal|lsb|slope|(?<!counts)_per", re.IGNORECASE)
-LARGEST_VALUE = 1e100  # in SI; squares of larger values may overflow
-LOWEST_RATE = 40.0  # Hz; half of it is below all vibrations that are felt
-EXAMPLE = "--quantity velocity --unit mm/s"
-LARGEST_TIME = 1e8  # s; later times count from an epoch
-TIME_DIGITS = 7  # to which programs round times
-LARGEST_ROUNDING = 0.25  # of a sampling interval
 LARGEST_GAPS = 0.1  # of the samples
-LARGEST_GAP_ERROR = 0.1  # of the RMS
-GAP_TRIALS = 16  # positions at which interpolation is tested
-GAP_MARGIN = 8  # samples on both sides of each
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -101,7 +92,8 @@ def complete(recording: Recording, given: Given, path: Path) -> Measurement:
     sign = given.sign or recording.sign
     values = units.in_si(recording.values, units.motion_divisor(unit, quantity))
     values = values * ((sign or 1) * factor)
-    if values.size and not np.abs(values).max() < LARGEST_VALUE:
+    largest_value = 1e100  # in SI; squares of larger values may overflow
+    if values.size and not np.abs(values).max() < largest_value:
         raise ValueError(f"values reach {np.abs(values).max():g} in SI; check them and --unit")
     if missing := int(np.isnan(recording.places).any(axis=1).sum()):
         count = len(recording.places)
@@ -161,9 +153,10 @@ def _quantity(recording: Recording, given: Given) -> tuple[str, str]:
     unit = given.unit or units.split_level(recording.unit)[0]
     by_unit = units.quantity_of(unit)
     quantity = given.quantity or (given.unit and by_unit) or recording.quantity or by_unit
+    example = "--quantity velocity --unit mm/s"
     if not unit:
         if not quantity:
-            raise ValueError(f"the file gives neither quantity nor unit; give {EXAMPLE}")
+            raise ValueError(f"the file gives neither quantity nor unit; give {example}")
         known = QUANTITIES.get(quantity)
         usual = units.canonical(known.shown) if known and quantity in units.MOTION else "UNIT"
         raise ValueError(f"the file gives no unit; give --unit {usual}")
@@ -225,7 +218,8 @@ def _sample_evenly(
             remarks.append(f"{cut} samples at the start or the end have no value and are left out")
         times, full = times[part], full[:, part]
         _interpolate(full, remarks)
-    if len(times) > 1 and (rate := 1 / (times[1] - times[0])) < LOWEST_RATE:
+    lowest_rate = 40.0  # Hz; half of it is below all vibrations that are felt
+    if len(times) > 1 and (rate := 1 / (times[1] - times[0])) < lowest_rate:
         remarks.append(f"samples at {rate:.3g} Hz show no vibration that is felt; check the times, "
                        "or give --rate")  # fmt: skip
     drive = full[0, :, count] if has_drive else recording.drive
@@ -262,7 +256,8 @@ def _times(recording: Recording, given: Given, remarks: list[str]) -> tuple[Floa
 def _even_times(times: Floats) -> tuple[Floats, np.ndarray]:
     """Return even times (n,) from rounded ones with missing rows, and indices (t,) of rows."""
     largest = float(np.abs(times).max(initial=0.0))
-    if largest > LARGEST_TIME:
+    largest_time = 1e8  # s; later times count from an epoch
+    if largest > largest_time:
         times = times - times[0]
     steps, index = np.diff(times), np.arange(len(times))
     if not np.isfinite(times).all():
@@ -277,8 +272,10 @@ def _even_times(times: Floats) -> tuple[Floats, np.ndarray]:
     index = np.concatenate([[0], np.cumsum(np.rint(steps / step).astype(int))])
     step, start = np.polyfit(index, times, 1)
     away = float(np.abs(times - start - step * index).max())
-    rounding = 0.51 * 10.0 ** (np.floor(np.log10(largest)) + 1 - TIME_DIGITS)
-    allowed = max(UNEVEN * step, min(rounding, LARGEST_ROUNDING * step))
+    time_digits = 7  # to which programs round times
+    rounding = 0.51 * 10.0 ** (np.floor(np.log10(largest)) + 1 - time_digits)
+    largest_rounding = 0.25  # of a sampling interval
+    allowed = max(UNEVEN * step, min(rounding, largest_rounding * step))
     if np.diff(index).min() < 1 or away > allowed:
         steps_s = f"{steps.min():g} to {steps.max():g} s"
         raise ValueError(f"times must rise in equal steps, not {steps_s}; if rounded, give --rate")
@@ -320,17 +317,20 @@ def _fill(row: Floats, gap: np.ndarray) -> float:
 
     known = np.flatnonzero(~gap)
     longest = int(np.diff(known).max()) - 1
-    width = longest + 2 * GAP_MARGIN
+    gap_margin = 8  # samples on both sides of each
+    width = longest + 2 * gap_margin
     free = np.flatnonzero(np.convolve(gap, np.ones(width), "valid") == 0)
     size, error = float(row[known].std()), np.inf
-    if len(free) >= GAP_TRIALS and gap.sum() <= LARGEST_GAPS * len(row):
-        hidden, away = slice(GAP_MARGIN, GAP_MARGIN + longest), []
-        for first in free[np.linspace(0, len(free) - 1, GAP_TRIALS).astype(int)]:
+    gap_trials = 16  # positions at which interpolation is tested
+    if len(free) >= gap_trials and gap.sum() <= LARGEST_GAPS * len(row):
+        hidden, away = slice(gap_margin, gap_margin + longest), []
+        for first in free[np.linspace(0, len(free) - 1, gap_trials).astype(int)]:
             at = np.arange(first, first + width)
             others = np.delete(at, hidden)
             away.append(CubicSpline(others, row[others])(at[hidden]) - row[at[hidden]])
         error = float(np.sqrt(np.mean(np.square(away)))) / size if size > 0 else 0.0
-    if not error <= LARGEST_GAP_ERROR:
+    largest_gap_error = 0.1  # of the RMS
+    if not error <= largest_gap_error:
         missing = f"{int(gap.sum())} samples are missing, up to {longest} in a row"
         raise ValueError(f"{missing}, too many to interpolate; choose --columns, or cut the rows")
     row[gap] = CubicSpline(known, row[known])(np.flatnonzero(gap))

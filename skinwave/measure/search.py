@@ -22,18 +22,8 @@ from skinwave.system.effort import Progress
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.typing import Floats
 
-FORWARD_STEP, CENTRAL_STEP = 1e-5, 1e-3  # of differences, in the unit interval
 MOST_EVALUATIONS = 40  # of one local search
-ROUGH_TOLERANCE, FINE_TOLERANCE = 1e-5, 1e-8  # of chi squared
-CANDIDATES = 4  # points of the hypercube per start
-DELAYS_PER_PERIOD, MOST_DELAYS = 4, 400  # of a scan; periods of the highest frequency
-SCAN_RATIO = 1.25  # of neighbouring values in a scan of a logarithm
-FEWEST_SCANNED, MOST_SCANNED = 12, 40  # positions
-SHORT_SEARCH = 8  # evaluations that show whether a minimum of a scan leads lower
-MOST_HOPS = 5  # from one minimum to a lower one
-SAME_MINIMUM = 1e-3  # in the unit interval
-LEAST_GAIN = 1e-4  # of chi squared, of a lower minimum
-SAME_COST = 1.0  # of twice the log-likelihood, of starts that reached the best minimum
+ROUGH_TOLERANCE = 1e-5  # of chi squared
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,8 +45,9 @@ class Problem:
     def slopes(self, u: Floats) -> Floats:
         """Return derivatives (n s, k) of the residual by central differences within the limits."""
         columns = []
+        central_step = 1e-3  # of differences, in the unit interval
         for k in range(len(u)):
-            ends = np.clip([u[k] - CENTRAL_STEP, u[k] + CENTRAL_STEP], 0, 1)
+            ends = np.clip([u[k] - central_step, u[k] + central_step], 0, 1)
             low, high = (self.residual(_with(u, k, end)) for end in ends)
             columns.append((high - low) / (ends[1] - ends[0]))
         return np.array(columns).T
@@ -64,7 +55,8 @@ class Problem:
     def forward_slopes(self, u: Floats) -> Floats:
         """Return the same by one-sided differences, towards the middle, at half the cost."""
         at = self.residual(u)
-        steps = np.where(u < 0.5, FORWARD_STEP, -FORWARD_STEP)
+        forward_step = 1e-5  # of differences, in the unit interval
+        steps = np.where(u < 0.5, forward_step, -forward_step)
         each = (self.residual(u + moved) for moved in np.diag(steps))
         return np.array([(moved - at) / step for moved, step in zip(each, steps, strict=True)]).T
 
@@ -119,7 +111,8 @@ class Solution:
     def agreeing_starts(self) -> int:
         """Number of starts that ended with the best chi squared."""
         best = self.starts[0].cost
-        return sum(start.cost - best <= SAME_COST * self.scale for start in self.starts)
+        same_cost = 1.0  # of twice the log-likelihood, of starts that reached the best minimum
+        return sum(start.cost - best <= same_cost * self.scale for start in self.starts)
 
 
 def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solution:
@@ -130,14 +123,16 @@ def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solut
     if count < k:
         raise ValueError(f"{count} values cannot determine {k} parameters; vary fewer keys")
     hypercube = qmc.LatinHypercube(k, rng=seed)
-    points = [hypercube.random(CANDIDATES) for _ in range(starts)]
+    candidates = 4  # points of the hypercube per start
+    points = [hypercube.random(candidates) for _ in range(starts)]
     failures: dict[str, str] = {}
     found = search(problem.rough, points, progress, failures)
     if not found:
         raise ValueError(failure_text(failures))
     ordered = sorted(found, key=lambda start: start.cost)
     progress("fit to all data", 0.0)
-    best = refine(problem, ordered[0].ended, tolerance=FINE_TOLERANCE)
+    fine_tolerance = 1e-8  # of chi squared
+    best = refine(problem, ordered[0].ended, tolerance=fine_tolerance)
     progress("derivatives", 0.0)
     return Solution(
         problem=problem, u=best.ended,
@@ -169,12 +164,13 @@ def search(
     """Return the results of starts that do not fail, in order, each with candidates (c, k)."""
     results: list[Start] = []
     minima: list[tuple[Start, Start]] = []  # each with the one that its scans lead to
+    same_minimum = 1e-3  # in the unit interval
     for n, candidates in enumerate(starts):
         progress("search from several starts", n / len(starts))
         with or_failed(failures, f"start {n + 1}"):
             local = refine(problem, best_candidate(problem, candidates))
             near = (end for start, end in minima
-                    if np.abs(start.ended - local.ended).max() <= SAME_MINIMUM)  # fmt: skip
+                    if np.abs(start.ended - local.ended).max() <= same_minimum)  # fmt: skip
             lowest = next(near, None)
             if lowest is None:
                 lowest = descend(problem, local)
@@ -185,7 +181,8 @@ def search(
 
 def descend(problem: Problem, local: Start) -> Start:
     """Return the lowest minimum that scans of one parameter after another lead to."""
-    for _ in range(MOST_HOPS):
+    most_hops = 5  # from one minimum to a lower one
+    for _ in range(most_hops):
         lower = _lower(problem, local)
         if lower is None:
             break
@@ -195,12 +192,14 @@ def descend(problem: Problem, local: Start) -> Start:
 
 def _lower(problem: Problem, local: Start) -> Start | None:
     """Return a lower minimum near a minimum of a scan, if there is any."""
+    short_search = 8  # evaluations that show whether a minimum of a scan leads lower
+    least_gain = 1e-4  # of chi squared, of a lower minimum
     for k, key in enumerate(problem.parameters.keys):
         if key in (DELAY, *problem.linear):
             continue
         for u in _scan_minima(problem, local, k):
-            trial = refine(problem, u, SHORT_SEARCH)
-            if trial.cost < (1 - LEAST_GAIN) * local.cost:
+            trial = refine(problem, u, short_search)
+            if trial.cost < (1 - least_gain) * local.cost:
                 return trial if trial.converged else refine(problem, trial.ended)
     return None
 
@@ -208,8 +207,10 @@ def _lower(problem: Problem, local: Start) -> Start | None:
 def _scan_minima(problem: Problem, local: Start, k: int) -> list[Floats]:
     """Return the minima (k,) along a parameter through the end of a local search."""
     free, u = problem.parameters.free[k], local.ended
-    count = int(np.ceil(free.span / np.log(SCAN_RATIO))) if free.is_log else FEWEST_SCANNED
-    positions = np.linspace(0, 1, int(np.clip(count, FEWEST_SCANNED, MOST_SCANNED)))
+    scan_ratio = 1.25  # of neighbouring values in a scan of a logarithm
+    fewest_scanned, most_scanned = 12, 40  # positions
+    count = int(np.ceil(free.span / np.log(scan_ratio))) if free.is_log else fewest_scanned
+    positions = np.linspace(0, 1, int(np.clip(count, fewest_scanned, most_scanned)))
     positions = np.sort(np.append(positions, u[k]))
     scan = [_with_cheap_parameters(problem, _with(u, k, at)) for at in positions]
     costs = np.array([np.inf, *(cost for cost, _ in scan), np.inf])
@@ -251,8 +252,9 @@ def _delays(problem: Problem, at: int) -> list[float]:
     """Return positions of delays, close enough to resolve the periods of the data."""
     delay, data = problem.parameters.free[at], problem.data
     highest = 0.1 / np.diff(data.axis).min() if data.is_in_time else data.axis.max()
-    count = int(np.ceil(DELAYS_PER_PERIOD * highest * (delay.high - delay.low) / 1e3)) + 2
-    return [delay.position(x) for x in np.linspace(delay.low, delay.high, min(count, MOST_DELAYS))]
+    delays_per_period, most_delays = 4, 400  # of a scan; periods of the highest frequency
+    count = int(np.ceil(delays_per_period * highest * (delay.high - delay.low) / 1e3)) + 2
+    return [delay.position(x) for x in np.linspace(delay.low, delay.high, min(count, most_delays))]
 
 
 def _with_factor(problem: Problem, u: Floats, at: int | None) -> tuple[float, Floats]:

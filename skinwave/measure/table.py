@@ -19,8 +19,6 @@ from skinwave.typing import Floats
 EXAMPLE = "t [s], v(0,0) [mm/s], v(5,0) [mm/s]"
 LONG_EXAMPLE = "t [s], x [mm], y [mm], v [mm/s]"
 SIGNS = {"into the body": 1, "out of the body": -1}
-UNEVENNESS = 1e-2  # of the range: largest distance of rounded times from a straight line
-FEWEST_ROWS = 4  # that show whether a column rises
 # Keys of notes, in lower case.
 _RATE = re.compile(r"sampl\w*[ _-]*(rate|freq\w*)|abtast(rate|frequenz)|fs|rate")
 _INTERVAL = re.compile(
@@ -208,12 +206,14 @@ def _counts(numbers: Floats) -> bool:
 
 def rises(numbers: Floats) -> bool:
     """Whether numbers rise like times: evenly except for rounding, or in every step."""
-    if len(numbers) < FEWEST_ROWS or not np.isfinite(numbers).all() or np.diff(numbers).min() < 0:
+    fewest_rows = 4  # that show whether a column rises
+    if len(numbers) < fewest_rows or not np.isfinite(numbers).all() or np.diff(numbers).min() < 0:
         return False
     span = float(np.ptp(numbers))
     even = np.linspace(numbers[0], numbers[-1], len(numbers))
-    is_even = np.abs(numbers - even).max() <= UNEVENNESS * span
-    rises_always = len(numbers) > 2 * FEWEST_ROWS and np.diff(numbers).min() > 0
+    unevenness = 1e-2  # of the range: largest distance of rounded times from a straight line
+    is_even = np.abs(numbers - even).max() <= unevenness * span
+    rises_always = len(numbers) > 2 * fewest_rows and np.diff(numbers).min() > 0
     return span > 0 and bool(is_even or rises_always)
 
 

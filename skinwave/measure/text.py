@@ -28,22 +28,15 @@ from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
 LARGEST = 256_000_000  # bytes
-LVM_FIRST_LINE = "LabVIEW Measurement"  # whatever the suffix of the file
 SAMPLE_ROWS = 100  # at the end of a file, which show the layout
-MISSING = (
-    "", "-", "--", "---", "na", "n/a", "#n/a", "null", "none", "nan", "1.#qnan", "-1.#ind",
-    "1.#ind", "missing", "invalid",
-)  # fmt: skip
-OVERLOAD = ("∞", "+∞", "1.#inf", "overload", "over")
-COMMENT = "#%;/!"  # first letters of lines with notes
-DELIMITER_NAMES = {"\t": "tabs", " ": "white space", ",": "commas", ";": "semicolons"}
 _LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
 
 
 def read(path: Path, given: Given) -> Recording:
     """Return the recording in a text file. Raises a ValueError if it has no table of motion."""
     text = read_exported_text(path, LARGEST)
-    is_lvm = text.startswith(LVM_FIRST_LINE)
+    lvm_first_line = "LabVIEW Measurement"  # whatever the suffix of the file
+    is_lvm = text.startswith(lvm_first_line)
     return read_lvm(text, given) if is_lvm else recording_of(parse_table(text), given)
 
 
@@ -174,9 +167,14 @@ def _value(cell: str) -> float | None:
     number = number_in(cell)
     if number is not None:
         return number
-    if cell.lower() in MISSING:
+    missing = (
+        "", "-", "--", "---", "na", "n/a", "#n/a", "null", "none", "nan", "1.#qnan", "-1.#ind",
+        "1.#ind", "missing", "invalid",
+    )  # fmt: skip
+    if cell.lower() in missing:
         return np.nan
-    return np.inf if cell.lower().lstrip("-") in OVERLOAD else _clock_seconds(cell)
+    overload = ("∞", "+∞", "1.#inf", "overload", "over")
+    return np.inf if cell.lower().lstrip("-") in overload else _clock_seconds(cell)
 
 
 def _clock_seconds(cell: str) -> float | None:
@@ -213,8 +211,9 @@ def _header(above: list[str], layout: _Layout) -> tuple[list[str], list[str], No
             raise ValueError(f"line {at[-1] + 1} has '{cell[:40]}', not a number; correct it")
         names = names if parse_heading(names[0]).role else []
     count = len(names) or (0 if units else width)
+    delimiter_names = {"\t": "tabs", " ": "white space", ",": "commas", ";": "semicolons"}
     if count and (count <= numeric[-1] or (count > width and not units)):
-        cells = f"{width} cells between {DELIMITER_NAMES[layout.delimiter]}"
+        cells = f"{width} cells between {delimiter_names[layout.delimiter]}"
         raise ValueError(f"line {at[-1] + 2} has {cells}, but the header {count}; name each column")
     names, units = names + [""] * width, units + [""] * width
     notes += [
@@ -249,10 +248,11 @@ def _is_title(cells: list[str], count: int) -> bool:
 
 def _heading_cells(line: str, delimiter: str) -> list[str]:
     """Return cells that may be names or units; none for a note such as "# key: value"."""
-    is_comment = line.lstrip()[0] in COMMENT
+    comment = "#%;/!"  # first letters of lines with notes
+    is_comment = line.lstrip()[0] in comment
     if is_comment and ":" in line:
         return []
-    cells = _cells(line.lstrip(COMMENT + " ") if is_comment else line, delimiter)
+    cells = _cells(line.lstrip(comment + " ") if is_comment else line, delimiter)
     while cells and not cells[-1]:
         cells.pop()
     return cells

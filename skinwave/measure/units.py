@@ -28,7 +28,6 @@ MOTION = {
 }  # fmt: skip
 REFERENCES = ("N", "mN", "kN", "V", "mV", "Pa", "kPa", "A", "mA", "lbf")
 ANGLES = {"deg": 1.0, "rad": 1.0}
-_LETTERS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "°": "deg", "º": "deg"})
 # Spelled-out units of programs and languages, in lower case.
 _SPELLINGS = {
     word: unit
@@ -88,7 +87,10 @@ def check_linear(unit: str, text: str = "") -> None:
 
 def canonical(unit: str) -> str:
     """Return the canonical spelling of a unit: "um/s" for "µm·s^-1", "m/s2" for "m/s/s"."""
-    text = unit.strip().strip("[]()").translate(_LETTERS).replace("**", "^").replace("^", "")
+    letters = str.maketrans(
+        {"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "°": "deg", "º": "deg"}
+    )
+    text = unit.strip().strip("[]()").translate(letters).replace("**", "^").replace("^", "")
     text = re.sub(r"[\s·*.]*s-1$", "/s", text)
     text = re.sub(r"[\s·*.]*s-2$|/s(ec)?/s(ec)?$|/s\^?2$|/\(s2\)$", "/s2", text).replace(" ", "")
     above, slash, below = text.partition("/")

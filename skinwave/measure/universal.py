@@ -18,14 +18,8 @@ from skinwave.measure.recording import Given, Recording, unknown_places
 from skinwave.system.formats import MEASUREMENTS, register
 from skinwave.typing import Floats
 
-LARGEST = 1_000_000_000  # bytes
-FUNCTION, NODES, LENGTH_UNIT = 58, (15, 2411), 164  # types of sets
-QUANTITIES = {8: "displacement", 11: "velocity", 12: "acceleration"}
-SI = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
-GENERAL, IN_TIME, RESPONSE, SPECTRUM = 0, 1, 4, 12  # types of functions that have a phase
-SINGLE, COMPLEX = (2, 5), (5, 6)  # types of values
-ROW = 6  # values of a line of text, which may be filled up
-TIME, FREQUENCY = 17, 18  # types of abscissas
+IN_TIME, RESPONSE = 1, 4  # types of functions that have a phase
+COMPLEX = (5, 6)  # types of values
 SET_TAG = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")  # line before and after each set
 SET_TYPE = re.compile(rb"[^\r\n]*[\r\n]+ *(\d+)")
 HEADER = re.compile(rb"(?:[^\r\n]*(?:\r\n|\r|\n)){13}")
@@ -89,8 +83,9 @@ def recording_of(
         remarks.insert(0, "frequency responses: values are per unit of the reference")
         remarks += _driving_points(motion, given)
     unit, level = units.split_level(first.unit)
+    si = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
     if not unit and first.quantity and not given.unit:
-        unit = f"{1 / per_metre!r} {SI[first.quantity]}"
+        unit = f"{1 / per_metre!r} {si[first.quantity]}"
         remarks.insert(0, f"the file gives no unit; {unit} is assumed, and --unit replaces it")
     places = unknown_places(len(nodes))
     if positions and set(nodes) <= positions.keys():
@@ -107,24 +102,26 @@ def recording_of(
 
 def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], float]:
     """Return functions, coordinates by node, and the number of units of length per metre."""
-    with reading.open_regular(path, LARGEST) as file:
+    largest = 1_000_000_000  # bytes
+    with reading.open_regular(path, largest) as file:
         content = file.read()
     tags = [match.start() for match in SET_TAG.finditer(content)]
     if len(tags) % 2:
         raise ValueError("the file ends within a set; export it again")
     functions, types, per_metre = [], set[int](), 1.0
     positions: dict[int, tuple[float, float]] = {}
+    function, nodes, length_unit = 58, (15, 2411), 164  # types of sets
     for begin, end in zip(tags[::2], tags[1::2], strict=True):
         block = content[begin:end]
         kind = int(found[1]) if (found := SET_TYPE.match(block)) else 0
         types.add(kind)
-        if kind == FUNCTION:
+        if kind == function:
             functions.append(_function(block))
-        elif kind in NODES:  # node, three integers, x, y, z
+        elif kind in nodes:  # node, three integers, x, y, z
             rows = _text_numbers(b" ".join(block.splitlines()[2:]))
             rows = rows[: len(rows) // 7 * 7].reshape(-1, 7)
             positions |= {int(node): (x, y) for node, *_, x, y, _ in rows.tolist()}
-        elif kind == LENGTH_UNIT:
+        elif kind == length_unit:
             length = _text_numbers(b" ".join(block.splitlines()[3:]))[:1]
             per_metre = float(length[0]) if len(length) and 0 < length[0] < np.inf else 1.0
     if not functions:
@@ -160,11 +157,13 @@ def _function(block: bytes) -> Function:
     parts = 1 + (form in COMPLEX) + (not is_even)
     values = values[: len(values) // parts * parts].reshape(-1, parts)
     is_text = "b" not in lines[1].lower()  # line ends may follow binary values
-    if count < 2 or len(values) < count or (is_text and len(values) > count + ROW):
+    row = 6  # values of a line of text, which may be filled up
+    if count < 2 or len(values) < count or (is_text and len(values) > count + row):
         raise ValueError(f"a set 58 has {len(values)} of {count} values; export it again")
     x = start + step * np.arange(count) if is_even else values[:count, 0]
     y = values[:count, -1] if form not in COMPLEX else values[:count, -2:] @ np.array([1, 1j])
-    is_in_time = abscissa == TIME if abscissa in (TIME, FREQUENCY) else kind == IN_TIME
+    time, frequency = 17, 18  # types of abscissas
+    is_in_time = abscissa == time if abscissa in (time, frequency) else kind == IN_TIME
     known, dimension = (units.TIMES, "time") if is_in_time else (units.FREQUENCIES, "frequency")
     alone, over = units.per_reference(unit), units.per_reference(f"{unit}/{per}")
     unit, is_per_reference = over if over[1] > alone[1] else alone
@@ -172,23 +171,25 @@ def _function(block: bytes) -> Function:
     said = [label, *([] if is_in_time or kind == RESPONSE else ids)]
     level = next(filter(None, (units.split_level(text)[1] for text in [unit, *said])), "")
     bare = units.split_level(unit)[0]
+    quantities = {8: "displacement", 11: "velocity", 12: "acceleration"}
     return Function(
         type=kind, unit=f"{bare} {level}".strip(), is_per_reference=is_per_reference,
-        quantity=QUANTITIES.get(ordinate, "") or units.quantity_of(bare),
+        quantity=quantities.get(ordinate, "") or units.quantity_of(bare),
         names=(at_by[4], "" if ids[0].upper() == "NONE" else ids[0]),
         at=(ends[0], ends[1]), by=(ends[2], ends[3]) if kind == RESPONSE else (0, 0),
         is_in_time=is_in_time, is_reference=any(REFERENCE.match(text) for text in ids[:2]),
-        is_other=ordinate not in (0, 1, *QUANTITIES), y=y,
+        is_other=ordinate not in (0, 1, *quantities), y=y,
         x=units.in_si(x, units.divisor(axis, known, dimension) if axis else 1.0),
     )  # fmt: skip
 
 
 def _numbers(body: bytes, form: int, coding: list[str]) -> Floats:
     """Return the numbers of a set: of text in columns of any width, or binary ones."""
+    single = (2, 5)  # types of values
     if coding[0].lower() == "58b":
         if coding[2] not in ("", "2"):
             raise ValueError("binary values that are not IEEE 754 are not supported; export text")
-        kind = ("<" if coding[1] == "1" else ">") + ("f4" if form in SINGLE else "f8")
+        kind = ("<" if coding[1] == "1" else ">") + ("f4" if form in single else "f8")
         size = np.dtype(kind).itemsize
         return np.frombuffer(body[: len(body) // size * size], kind).astype(np.float64)
     return _text_numbers(body)
@@ -202,7 +203,8 @@ def _text_numbers(body: bytes) -> Floats:
 
 def _motion(functions: list[Function], given: Given) -> tuple[list[Function], list[Function]]:
     """Return functions of motion along the direction, with phase, and all others."""
-    with_phase = [f for f in functions if f.type in (GENERAL, IN_TIME, RESPONSE, SPECTRUM)]
+    general, spectrum = 0, 12  # types of functions that have a phase
+    with_phase = [f for f in functions if f.type in (general, IN_TIME, RESPONSE, spectrum)]
     if not with_phase:
         cure = "export waveforms, spectra or frequency responses"
         raise ValueError(f"functions of type {functions[0].type} are not supported; {cure}")
