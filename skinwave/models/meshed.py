@@ -43,10 +43,6 @@ from skinwave.scene.scene import Reading
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, versions
 from skinwave.typing import Floats
 
-MOST_IMBALANCE = 0.01  # relative error of the energy balance, above which a response is refused
-ON_PLANE = 1e-9  # m, distance up to which a probe is on a plane
-WEAKEST_LINE = 1e-6  # of the strongest line of a load
-
 
 def mesh_body(
     body: Body,
@@ -76,10 +72,11 @@ def energy_balance(
     end, and the radiated share of the losses. Raises `fem.Diverged` if the error is too large.
     """
     imbalance = fem.imbalance(energies, stored)
-    if not imbalance <= MOST_IMBALANCE:
+    most_imbalance = 0.01  # relative error of the energy balance, above which a response is refused
+    if not imbalance <= most_imbalance:
         raise fem.Diverged(
             f"the energy balance has an error of {100 * imbalance:.2g} %{when}, above the limit of "
-            f"{100 * MOST_IMBALANCE:g} %; use another solver, or a finer mesh at thin parts"
+            f"{100 * most_imbalance:g} %; use another solver, or a finer mesh at thin parts"
         )
     radiated = energies.radiated / energies.lost if energies.lost > 0 else 0.0
     return imbalance, radiated
@@ -138,7 +135,8 @@ def load_in_steps(
     """
     if not any(is_folded(pressure, times) for pressure in pressures):
         return lambda t: np.concatenate([_mean_in_step(p, points, t, dt) for p in pressures])
-    f, lines = load_lines_at(pressures, points, WEAKEST_LINE)
+    weakest_line = 1e-6  # of the strongest line of a load
+    f, lines = load_lines_at(pressures, points, weakest_line)
     below = below_half_the_rate(f, times)
     f, lines = f[below], lines[below]
     return lambda t: (np.exp(2j * np.pi * f * t) @ lines).real
@@ -270,7 +268,8 @@ def mirrored_axes(body: Body, reading: Reading, load: Load) -> str:
 
 def axes_of_probes(probes: Floats, among: str) -> str:
     """Return the axes, `among` "xy", on whose middle planes all probes (p, 2) in m lie."""
-    return "".join(axis for axis in among if np.abs(probes[:, "xy".index(axis)]).max() < ON_PLANE)
+    on_plane = 1e-9  # m, distance up to which a probe is on a plane
+    return "".join(axis for axis in among if np.abs(probes[:, "xy".index(axis)]).max() < on_plane)
 
 
 def modelled_axes(body: Body, probes: Floats, symmetry: str, reading: Reading, load: Load) -> str:

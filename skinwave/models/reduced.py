@@ -50,11 +50,7 @@ from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, sil
 from skinwave.typing import Bools, Floats
 
 REDUCTION_TOLERANCE = 4e-3  # at most
-SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
 FORMAT = "reduced 13"  # of a cached body
-MANY_OUTPUTS = 24  # from where a body is reduced for one path, whose load has about as many parts
-PATH_SHARE = 3  # of that tolerance: error of the load along a path
-NEGLIGIBLE_LINE_RATIO = 1e-7  # to the strongest line at the probes
 
 
 def reduction_tolerance(tolerance: float, share: float = 1 / 15) -> float:
@@ -137,13 +133,17 @@ def prepare(
     clock, report, solver = Clock(), options.progress, options.solver
     probes, reading, load = scene.probe_points, scene.reading, scene.load
     tolerance = reduction or reduction_tolerance(options.tolerance)
-    body = relaxing(scene.body, SERIES_ERROR * tolerance)
+    # Times that of the reduction: with `reduction_tolerance` the `series_tolerance`.
+    series_error = 5
+    body = relaxing(scene.body, series_error * tolerance)
     symmetry = meshed.modelled_axes(body, probes, symmetry, reading, load)
     report("mesh", 0.0)
     build = meshed.mesh_body(body, options.h, clock, silent, symmetry, discretise)
     outputs, solids = meshed.probe_rows(body, build, meshed.images(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
-    along = scene.loads[0] if own_path and outputs.shape[0] > MANY_OUTPUTS else None
+    # From where a body is reduced for one path, whose load has about as many parts.
+    many_outputs = 24
+    along = scene.loads[0] if own_path and outputs.shape[0] > many_outputs else None
     path = path_key(along) if along else ""
     name = entry_name(
         body, build, probes, solver, tolerance, outputs=own, load=load,
@@ -229,6 +229,7 @@ def _prepare(
     band: float,
 ) -> ReducedBody:  # fmt: skip
     operators = meshed.assemble(build, clock, report)
+    path_share = 3  # of that tolerance: error of the load along a path
     with clock("factorise and reduce"):
         report("factorise", 0.0)
         P, points = meshed.even_part(*meshed.surface_load(build, load), build.symmetry)
@@ -236,7 +237,7 @@ def _prepare(
         motion = load.support_motion
         loads = meshed.spread(P, typical_spots(body, points))
         if along:
-            loads = path_loads(P, points, along, PATH_SHARE * tolerance)
+            loads = path_loads(P, points, along, path_share * tolerance)
         reduced, _ = reduce_body(
             body, build, operators, outputs, tolerance, surface=(P, points), loads=loads,
             inertia=meshed.inertia(build, motion.unit) if motion else None, solver=solver,
@@ -377,13 +378,14 @@ def answer(
     times = sample_times(scene) if times is None else times
     if progress:
         progress("lines", 0.0)
+    negligible_line_ratio = 1e-7  # to the strongest line at the probes
     with clock("lines"):
         highest = highest_driving(scene.pressure, times)
         motion = components(reduced, *scene.loads, highest=highest)
         # The mean of an unconstrained body has no bound, so that lines are not compared with it.
         strength, is_mean = np.abs(motion.lines).max(axis=1), motion.frequencies == 0
         strongest = strength[~is_mean].max(initial=0.0)
-        chosen = is_mean | (strength > NEGLIGIBLE_LINE_RATIO * strongest)
+        chosen = is_mean | (strength > negligible_line_ratio * strongest)
         chosen &= below_half_the_rate(motion.frequencies, times)
         moving = from_rest(select_lines(motion, chosen), times)
         waveforms = meshed.with_sag(moving, reduced.sag, quantity)

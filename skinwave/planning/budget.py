@@ -31,11 +31,6 @@ from skinwave.scene.spreads import PRESSURE, spreads_of
 from skinwave.scene.variation import with_values
 from skinwave.typing import Complex, Floats
 
-SIGMA = (0.15865525393145707, 0.8413447460685429)  # quantiles a standard deviation either way
-LINE_THRESHOLD = 1e-3  # of the load's strongest line
-NOT_IN_LAYERS = ("placement.", "probes.")  # sections whose numbers do not affect flat layers
-ENOUGH = 0.1  # of the uncertainty: a smaller numerical error gains nothing
-
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorBudget:
@@ -103,11 +98,13 @@ def _change(scene: Scene, spread: Spread) -> Floats:
 
     Raises a ValueError if it is not computed.
     """
-    key, ends = spread.key, spread.distribution.quantile(spread.value, SIGMA).tolist()
+    sigma = (0.15865525393145707, 0.8413447460685429)  # quantiles a standard deviation either way
+    key, ends = spread.key, spread.distribution.quantile(spread.value, sigma).tolist()
     if key == PRESSURE:
         return np.full(len(scene.probes), (ends[1] - ends[0]) / (2 * spread.value))
     lines_of = _closed_form(scene)
-    if lines_of is _lines_of_layers and key.startswith(NOT_IN_LAYERS):
+    not_in_layers = ("placement.", "probes.")  # sections whose numbers do not affect flat layers
+    if lines_of is _lines_of_layers and key.startswith(not_in_layers):
         raise ValueError(f"flat layers do not depend on {key}")
     try:
         lines = [lines_of(scene), *(lines_of(with_values(scene, {key: end})) for end in ends)]
@@ -143,7 +140,8 @@ def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
     """Return frequencies (f,) in Hz above 0 and amplitudes (f, p) at the probes of flat layers."""
     pressure = replace(scene.pressure, profile="gaussian")
     compliance = layered(flat_layers(scene.body))
-    f, a = steady_lines(compliance, pressure, scene.probe_points, threshold=LINE_THRESHOLD)
+    line_threshold = 1e-3  # of the load's strongest line
+    f, a = steady_lines(compliance, pressure, scene.probe_points, threshold=line_threshold)
     return f[f > 0], a[f > 0]
 
 
@@ -159,12 +157,13 @@ def mesh_row(scene: Scene, h: float | None, error: float) -> PlanRow:
     name, largest = budget.largest
     if not largest:
         return PlanRow(what="uncertainty", value=budget.spreads, reason="no spread is known")
+    enough = 0.1  # of the uncertainty: a smaller numerical error gains nothing
     reason = (
-        f"numerical errors below a tenth of that of the {name}, {change_text(ENOUGH * largest)}, "
+        f"numerical errors below a tenth of that of the {name}, {change_text(enough * largest)}, "
         "do not matter"
     )
     if h is not None and error > 0:
         coarsest = float(element_sizes(scene.body)[0])
-        size = min(controller(scene).size(h, error, ENOUGH * largest), max(coarsest, h))
+        size = min(controller(scene).size(h, error, enough * largest), max(coarsest, h))
         reason += f": elements of {significant(1e3 * size, 2)} mm are fine enough"
     return PlanRow(what="uncertainty", value=budget.spreads, reason=reason)

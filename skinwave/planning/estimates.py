@@ -17,12 +17,10 @@ from skinwave.bodies.supports import EDGES
 from skinwave.scene.scene import SAMPLE_RATE, Body, Scene
 from skinwave.typing import Complex, Floats
 
-REFLECTION = 0.03  # reflection coefficient of an absorbing side and the layer around it
 # Reflections of the four sides may be in phase; slabs reflected 0.5 to 0.9 times as much. Where
 # viscosity dominates, a free side reflects more than its image source: overdamped slabs of 80 to
 # 120 mm reflected 0.9 to 1.1 times the estimate with both factors, of 70 mm up to 1.5 times.
 IN_PHASE, OVERDAMPED = 2.0, 1.5
-UNCLAMPED = 2.0  # factor for a base that is not clamped: small plates had up to 2.3
 NO_BOUND = 2.0  # difference of two waveforms over the larger one, which it never exceeds
 FAR = 0.25  # m, beyond which waves are neglected
 DURATION = 0.1  # s of the estimate of reflections
@@ -107,9 +105,10 @@ def side_reflections(scene: Scene) -> float:
     ratio = float(np.sqrt((sum(reflected) / np.maximum(own, 1e-300)).max()))
     critical = min(1.0, _loss_at_cut_off(body) / 2)
     ratio *= IN_PHASE * (1 + (OVERDAMPED - 1) * critical)
+    unclamped = 2.0  # factor for a base that is not clamped: small plates had up to 2.3
     if body.base != "clamped":
         # Waves of all frequencies travel from side to side and bend the body as a whole.
-        ratio = UNCLAMPED * ratio / max(1 - UNCLAMPED * ratio, UNCLAMPED * ratio / NO_BOUND)
+        ratio = unclamped * ratio / max(1 - unclamped * ratio, unclamped * ratio / NO_BOUND)
     return min(NO_BOUND, ratio)
 
 
@@ -147,7 +146,8 @@ def absorbing_reflection(scene: Scene, half: Floats, highest: float) -> float:
         return 1.0
     power = np.interp(distances, table, strength @ np.abs(g) ** 2).mean(axis=2)
     ratio = power[1:].sum(axis=0) / np.maximum(power[0], 1e-300)
-    return min(1.0, REFLECTION * float(np.sqrt(ratio.max())))
+    reflection = 0.03  # reflection coefficient of an absorbing side and the layer around it
+    return min(1.0, reflection * float(np.sqrt(ratio.max())))
 
 
 def _mirror_images(points: Floats, half: Floats) -> list[Floats]:

@@ -28,11 +28,6 @@ from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Floats
 
 WIDER = 2.0  # times the width of the layer
-# Error over change: slabs on springs, free ones and half-spaces had 1.0 to 1.3.
-MARGIN = 1.5
-COARSE_REDUCTION = 0.01  # relative error of bodies that cannot be reduced to less
-SHARE = 0.25  # of the tolerance: error of absorbing ends above which the body is extended
-MOST_EXTENSIONS = 2
 
 
 def symmetry(scene: Scene) -> str:
@@ -66,10 +61,13 @@ def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -
         usual, wide = waveforms(1.0, reduction), waveforms(WIDER, reduction)
         return float(relative_changes(wide - usual, wide).max())
 
+    # Error over change: slabs on springs, free ones and half-spaces had 1.0 to 1.3.
+    margin = 1.5
+    coarse_reduction = 0.01  # relative error of bodies that cannot be reduced to less
     try:
-        return MARGIN * change(reduction_tolerance(options.tolerance) / 3)  # both have this error
+        return margin * change(reduction_tolerance(options.tolerance) / 3)  # both have this error
     except fem.NotReduced:  # a free body has hundreds of modes in a wide layer
-        return MARGIN * change(COARSE_REDUCTION)
+        return margin * change(coarse_reduction)
 
 
 def extent(
@@ -83,8 +81,10 @@ def extent(
     """
     body, rows = _within_reflections(scene, options.tolerance, highest)
     larger, error = body, absorbing_error(scene, body, options)
-    for _ in range(MOST_EXTENSIONS):
-        if error <= SHARE * options.tolerance or (next_larger := _larger(larger)) == larger:
+    share = 0.25  # of the tolerance: error of absorbing ends above which the body is extended
+    most_extensions = 2
+    for _ in range(most_extensions):
+        if error <= share * options.tolerance or (next_larger := _larger(larger)) == larger:
             break
         try:
             check_mesh(next_larger, default_size(next_larger))

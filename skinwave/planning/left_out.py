@@ -44,22 +44,13 @@ from skinwave.scene.scene import SAMPLE_RATE as RATE
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
-FIRST_SAMPLES, LONGER = 1000, 4  # samples of a start that are compared at first; factor on them
-LATER_SHARE = 0.02  # of the energy of a start: what may follow the compared samples
-NO_START = 1e-6  # of the largest probe's motion: weaker motion is round-off
 EXACT = SolveOptions(tolerance=1e-3)  # of the models that are compared
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet may be taken as linear
-# Relative error of linear bending over (w / h)^2 away from a resonance: 0.4 to 3.3 for paper sheets
-# of 30 to 210 mm, on four edges, two or in clips, with tension and without.
-STEEPEST = 7.0
 # Relative change of natural frequencies over (w / h)^2, under a mean deflection w: 0.7 of a clamped
 # plate, 2.6 of a simply supported one.
 HARDENING = 2.6
 NEGLIGIBLE = 0.1  # of the tolerance, of an error that is bounded rather than measured
-COARSENING = 2.0  # of the default element size
-DETUNING = 0.010  # relative excess of the natural frequencies of the coarse mesh
 SHIFT = 1e-3  # of natural frequencies, for the sensitivity
-SENSITIVITY_DURATION = 1.0  # s of the responses that are compared
 
 
 def start_error(
@@ -89,17 +80,20 @@ def _start(steady: Floats, from_rest: Callable[[int], Floats], first: int) -> fl
     negligible, assuming that the difference continues at its last level.
     """
     samples = len(steady)
-    n = min(samples, FIRST_SAMPLES)
+    first_samples, longer = 1000, 4  # samples of a start that are compared at first; factor on them
+    n = min(samples, first_samples)
+    later_share = 0.02  # of the energy of a start: what may follow the compared samples
     while True:
         whole = from_rest(n)
         squared = (whole - steady[:n]) ** 2
         later = squared[3 * n // 4 :].mean(axis=0) * (samples - n)
         energy = squared[first:].sum(axis=0)
-        if n == samples or (later <= LATER_SHARE * energy).all():
+        if n == samples or (later <= later_share * energy).all():
             break
-        n = min(samples, LONGER * n)
+        n = min(samples, longer * n)
     size = (whole[first:] ** 2).sum(axis=0) + (steady[max(n, first) :] ** 2).sum(axis=0)
-    size = np.maximum(size, NO_START**2 * size.max())
+    no_start = 1e-6  # of the largest probe's motion: weaker motion is round-off
+    size = np.maximum(size, no_start**2 * size.max())
     return float(np.sqrt((energy + later) / np.where(size > 0, size, np.inf)).max())
 
 
@@ -180,7 +174,10 @@ def _stretching_bound(scene: Scene, negligible: float) -> float:
     (w / h)^2, and a resonance multiplies this.
     """
     squared, plain = linear_deflection(scene) ** 2, _displacement_scene(scene)
-    bound = STEEPEST * squared
+    # Relative error of linear bending over (w / h)^2 away from a resonance: 0.4 to 3.3 for paper
+    # sheets of 30 to 210 mm, on four edges, two or in clips, with tension and without.
+    steepest = 7.0
+    bound = steepest * squared
     if not squared or bound > negligible or not takes(FROM_REST, plain):
         return bound
     return max(bound, HARDENING * plate_modes.sensitivity(plain) * squared)
@@ -243,12 +240,15 @@ def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> tuple[floa
     frequencies, and the root-mean-square frequency of the motion in Hz, from two responses of a
     reduced body, by default on a coarse mesh.
     """
-    h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
+    coarsening = 2.0  # of the default element size
+    h = min(coarsening * default_size(scene.body), coarsest_size(scene.body))
     moving = replace(scene, load=scene.load.moving)
     coarse = prepared or prepare(moving, SolveOptions(h=h))
-    values = coarse.poles.values * (1 - DETUNING)
+    detuning = 0.010  # relative excess of the natural frequencies of the coarse mesh
+    values = coarse.poles.values * (1 - detuning)
     frequencies, forces = reduced_forces(coarse, *scene.loads)
-    duration = min(scene.tacton.duration, SENSITIVITY_DURATION)
+    sensitivity_duration = 1.0  # s of the responses that are compared
+    duration = min(scene.tacton.duration, sensitivity_duration)
     times = np.arange(max(2, round(duration * RATE))) / RATE
 
     def waveforms(shift: float) -> Floats:

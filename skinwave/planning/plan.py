@@ -38,11 +38,8 @@ from skinwave.scene.scene import Scene
 from skinwave.system.progress_bar import announce
 from skinwave.typing import Floats
 
-THE_LOAD = ErrorPart(name="load", source="the pressure at the probes", error=0.0)
 Grid = tuple[Floats, int]  # see `sample_grid`
-WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
 REQUESTED = "as requested"
-WIDEST = 4  # times its usual band, for a reduced model of a stiff body under fast loads
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,6 +108,7 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     request = _choose_model(scene, options, sample_grid(scene, options.times))
     announce(options.progress, "estimate errors")
     model, tolerance = request.model, options.tolerance
+    the_load = ErrorPart(name="load", source="the pressure at the probes", error=0.0)
     if scene.body.of_kind.discretise:
         planned, parts = (_plan_elements if model.is_refined else _plan_without_mesh)(request)
         scene = replace(scene, body=planned.body)
@@ -118,7 +116,7 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
         planned = replace(planned, rows=(*planned.rows, *_law_rows(scene, model, tolerance)))
     else:
         planned = Plan(model=model.name, body=scene.body, rows=(request.model_row(),))
-        parts = [THE_LOAD]
+        parts = [the_load]
     statement = Statement(parts=tuple(parts), tolerance=tolerance)
     planned = _with_cost(planned, scene, model, options)
     rows, cautions = (*planned.rows, _error_row(statement)), implausible(scene)
@@ -195,7 +193,8 @@ def model_from_rest(scene: Scene, options: SolveOptions = DEFAULT) -> tuple[Mode
             f"thicknesses, and stretching changes its motion by {change_text(stretching)}"
         )
     reflections = _reflections(scene)
-    is_infinite = reflections <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene)
+    waves_share = 0.8  # of the tolerance: largest reflections of sides that may be neglected
+    is_infinite = reflections <= waves_share * tolerance and takes(FLAT_BODY, scene)
     if is_infinite and (scene.body.of_kind.is_layer or _suffices(FLAT_BODY, scene, tolerance)):
         if scene.body.sides == "absorbing":
             return FLAT_BODY, "flat layers with absorbing sides, which need no mesh"
@@ -379,13 +378,14 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
 def _with_band(scene: Scene, options: SolveOptions, axes: str, times: Floats) -> SolveOptions:
     """Return options with the band that has the motion of a scene on a coarse mesh."""
     h = options.h or first_size(scene, element_sizes(scene.body), options.tolerance)
-    for band in (options.band * n for n in range(1, WIDEST)):
+    widest = 4  # times its usual band, for a reduced model of a stiff body under fast loads
+    for band in (options.band * n for n in range(1, widest)):
         tried = replace(options, h=h, band=band)
         coarse = prepare(scene, tried, symmetry=axes, own_path=True)
         moved = answer(coarse, scene, times=times).values
         if above_band(moved, times[1], band) <= options.tolerance / 2:
             return replace(options, band=band)
-    return replace(options, band=options.band * WIDEST)
+    return replace(options, band=options.band * widest)
 
 
 def rest_of(tolerance: float, error: float) -> float:

@@ -18,7 +18,6 @@ from skinwave.planning.left_out import LINEAR, deflection_ratio
 from skinwave.scene.scene import Scene
 
 NONLINEAR = "plate-modes-nonlinear", "fem-nonlinear"  # the cheaper first
-DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
 LOSS = "loss_factor"
 WithRange = tuple[str, float, str, float, float, str]  # key, value, whose range, low, high, unit
 WEAK_LINE_RATIO = 0.05  # of the strongest line of a load: no warning if weaker ones are left out
@@ -161,8 +160,9 @@ def _with_ranges(scene: Scene) -> Iterator[WithRange]:
     yield "points_mm", farthest, "the farthest probes are at", 0.1, 1e4, " mm"
     if not kind.discretise:
         return
+    densities = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
     for solid in body.solids:
-        yield "density_kg_m3", solid.density, "solids have", *DENSITIES, " kg/m³"
+        yield "density_kg_m3", solid.density, "solids have", *densities, " kg/m³"
         yield "shear_modulus_pa", solid.shear_modulus, "solids have", 100, 1e12, " Pa"
         yield LOSS, solid.loss_factor, "solids have", 0, 2, ""
     thinnest = 1e-3 if kind.is_plate else 0.1

@@ -31,13 +31,10 @@ from skinwave.typing import Array, Floats
 # above the default size, and up to it, where cells far from the focus are as large in both.
 APART = 1.6, 2.0
 # Ratio of their cells along an axis; and of successive sizes of a refinement, at least.
-CELLS_APART, STEP = 1.45, 1.3
-COMPARABLE = 1.25, 1.75  # ratios of cells of meshes that are compared in any case
-LAST_STEP = 1.1  # to the finest mesh, at least
+STEP = 1.3
 # Of the default element size: the coarsest mesh of bodies whose elements follow their layers, and
 # of others, and the finest that is tried.
-COARSEST, COARSEST_HAND, FINEST = 4.5, 2.8, 0.4
-STILL = 1e-6  # of the waveforms: weaker motion about their mean is round-off
+COARSEST, FINEST = 4.5, 0.4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,13 +73,6 @@ class SizeController:
         return nearest_size(sizes, wanted)
 
 
-# Clamped edges and jumps of material slow the convergence, and so does strain. A palm has no such
-# edges, because its supports begin smoothly.
-SINGULAR, SMOOTH = SizeController(), SizeController(margin=1.1, at_default=0.012)
-# Meshes of files vary between runs, and one more takes longer than slightly smaller elements.
-FROM_FILE = SizeController(at_default=0.026)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refined:
     """Refined mesh: its element size `h` in m, its expected relative `error` from `mesh_error`, the
@@ -116,7 +106,8 @@ def refine(
     coarse_sizes = sizes[: max(1, np.count_nonzero(sizes > size))]
     wanted = apart(body, size) * size
     before = comparison_size(body, h) if h else nearest_size(coarse_sizes, wanted)
-    low, high = COMPARABLE
+    comparable = 1.25, 1.75  # ratios of cells of meshes that are compared in any case
+    low, high = comparable
     if body.file and not h and low < map_size(body) / size < high:
         before = map_size(body)  # a mesh less, if there is a map
     with beside() as begin:
@@ -124,12 +115,14 @@ def refine(
         coarser = begin(solve, before, silent) if begin and not body.file else None
         prepared, values = solve(size)
         solved = {before: coarser.result() if coarser else solve(before)}
+    cells_apart = 1.45
+    last_step = 1.1  # to the finest mesh, at least
     while True:
         ratios = {
             each: refinement_ratio(body, coarse.effort, prepared.effort)
             for each, (coarse, _) in solved.items()
         }
-        nearest = min(ratios, key=lambda each: abs(np.log(ratios[each] / CELLS_APART)))
+        nearest = min(ratios, key=lambda each: abs(np.log(ratios[each] / cells_apart)))
         # The largest estimate, because a mesh may agree with another by chance.
         found = {
             each: mesh_error(meshed, ratio, (solved[each][1], values))
@@ -141,7 +134,7 @@ def refine(
             costs = solved[before][0].effort.seconds, prepared.effort.seconds
             seconds = max(costs, key=lambda each: sum(each.values()))
             prepared = replace(prepared, effort=replace(prepared.effort, seconds=seconds))
-        if h or not tolerance < error < np.inf or sizes[-1] > size / LAST_STEP:
+        if h or not tolerance < error < np.inf or sizes[-1] > size / last_step:
             return Refined(h=size, error=error, compared=before, prepared=prepared)
         solved[size] = prepared, values
         size = controller(meshed).nearest(finer_sizes(sizes, size), size, error, tolerance)
@@ -150,10 +143,15 @@ def refine(
 
 def controller(scene: Scene) -> SizeController:
     """Return the controller of the element size in a scene."""
+    # Meshes of files vary between runs, and one more takes longer than slightly smaller elements.
+    from_file = SizeController(at_default=0.026)
     if scene.body.file:
-        return FROM_FILE
+        return from_file
     is_smooth = scene.body.of_kind.is_smooth and len(scene.body.strata) == 1
-    return SMOOTH if is_smooth and scene.reading.record.field != STRAIN else SINGULAR
+    # Clamped edges and jumps of material slow the convergence, and so does strain. A palm has no
+    # such edges, because its supports begin smoothly.
+    singular, smooth = SizeController(), SizeController(margin=1.1, at_default=0.012)
+    return smooth if is_smooth and scene.reading.record.field != STRAIN else singular
 
 
 def first_size(scene: Scene, sizes: Floats, tolerance: float) -> float:
@@ -184,8 +182,9 @@ def element_sizes(body: Body, steps: int = 12) -> Floats:
     of cell layers, or `steps` within a factor of 2.
     """
     coarsest, finest = COARSEST * default_size(body), FINEST * default_size(body)
+    coarsest_hand = 2.8
     if not body.of_kind.conforming:  # coarser meshes would cut off the rim and layers
-        coarsest = min(COARSEST_HAND * default_size(body), COMPARED * coarsest_size(body))
+        coarsest = min(coarsest_hand * default_size(body), COMPARED * coarsest_size(body))
         finest = max(finest, min(default_size(body), FINE_PALM))
     if not _has_cell_layers(body):
         sizes = default_size(body) * 2.0 ** (np.arange(-80, 80)[::-1] / steps)
@@ -253,7 +252,8 @@ def about_its_rest(scene: Scene, waveforms: Array) -> Array:
     if not scene.load.gravity:
         return waveforms
     moving = waveforms - waveforms.mean(axis=0)
-    is_still = np.linalg.norm(moving) <= STILL * np.linalg.norm(waveforms)
+    still = 1e-6  # of the waveforms: weaker motion about their mean is round-off
+    is_still = np.linalg.norm(moving) <= still * np.linalg.norm(waveforms)
     return waveforms if is_still else moving
 
 

@@ -14,9 +14,6 @@ from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import Refined
 from skinwave.scene.scene import Body, Scene
 
-STIFF_COAT_RATIO = 30.0  # to the modulus below, from where the error of a coat is stated
-LOWEST_AIR_FREQUENCY = 20.0  # Hz at which air is estimated if no line is higher
-
 
 def element_rows(
     scene: Scene,
@@ -101,6 +98,7 @@ def coat_rows(body: Body, h: float) -> list[PlanRow]:
     layers = list(zip(body.strata, thicknesses(body.strata), strict=True))[:-1]
     names = [f"{layer_name(body, solid)} of {1e3 * t:g} mm" for (_, solid), t in layers]
     rows = []
+    stiff_coat_ratio = 30.0  # to the modulus below, from where the error of a coat is stated
     if shell:
         reason = (
             f"a Kirchhoff shell on the surface, because it is thinner than half an element of "
@@ -108,7 +106,7 @@ def coat_rows(body: Body, h: float) -> list[PlanRow]:
         )
         below = body.strata[coated][1].shear_modulus
         ratio = max(solid.shear_modulus for solid in shell.materials) / below
-        if ratio >= STIFF_COAT_RATIO:
+        if ratio >= stiff_coat_ratio:
             reason += (
                 f"; it is {significant(ratio, 2)} times as stiff as the layer below: at 100 times, "
                 f"the error is at most 3{EN_DASH}15 % up to {AT:g} Hz for thicknesses of "
@@ -136,7 +134,8 @@ def neglected_rows(scene: Scene, highest: float) -> list[PlanRow]:
     body = scene.body
     if not body.of_kind.is_plate:
         return []
-    middle = max(highest / 2, LOWEST_AIR_FREQUENCY)
+    lowest_air_frequency = 20.0  # Hz at which air is estimated if no line is higher
+    middle = max(highest / 2, lowest_air_frequency)
     air = air_mass(body, middle) / body.mass_per_area
     sag = mean_sag(scene) / body.depth
     lower = f"resonances are {percent(1 - 1 / np.sqrt(1 + air))} lower near {middle:.0f} Hz"
