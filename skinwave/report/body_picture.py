@@ -31,9 +31,7 @@ from skinwave.scene.scene import Scene
 from skinwave.system.effort import Clock, silent
 from skinwave.typing import Array, Floats, Ints
 
-COARSER = 1.5  # element size of the picture over the default one
-WIDTH, HEIGHT, ROW = 7.0, 3.6, 0.24  # inch: of the picture, and of a row of its legend
-MOST_COLUMNS, NARROW_COLUMNS = 4, 2  # of the legend
+WIDTH = 7.0  # inch: of the picture, and of a row of its legend
 FREE, CLAMPED, SIMPLE, SPRINGS, ABSORBING = (
     "free", "clamped", "simply supported", "on springs", "absorbing"
 )  # fmt: skip
@@ -42,16 +40,12 @@ BOUNDARY = {
     ABSORBING: "#7db8dc",
 }  # fmt: skip
 REGIONS = ("#e8a48c", "#f3d7a2", "#c9705f", "#f6f1e0", "#b88fa8", "#a9a05f", "#d9c2d0")
-CAMERA = (0.55, -1.0, 0.7)  # direction to the camera
 # Lengths over the largest side of the body: the arrow to the device, the gap below it, and the
 # thickness of the support that is drawn below the body.
-ARROW, GAP, PLATE = 0.16, 0.05, 0.02
-EDGE = "#5a5f66"  # colour of the edges of elements
-STEEP = -0.7  # vertical component of the normal of a base, at most
+ARROW = 0.16
 FRONT, SECTION = 0.05, 241  # mm, of thin layers before a section; points along it
 SCALE = 2  # of lines and balls, which are drawn smaller
 FAR = 1e4  # mm, outside all bodies
-EDGES = np.array([[0, 3], [3, 1], [1, 4], [4, 2], [2, 5], [5, 0]])  # of a six-node facet
 LIT: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.6}
 
 
@@ -105,7 +99,8 @@ def drawn_size(body: Body) -> float:
     usual = default_size(body)
     if body.file:  # filling a surface takes long, and meshes of the default size are cached
         return usual
-    return min(COARSER * usual, max(coarsest_size(body), usual))
+    coarser = 1.5  # element size of the picture over the default one
+    return min(coarser * usual, max(coarsest_size(body), usual))
 
 
 def meshed_body(body: Body) -> MeshedBody:
@@ -168,13 +163,15 @@ def body_picture(scene: Scene, style: Style = REPORT) -> render.Image:
     Raises the errors of `bodies.build.build`, or a ValueError if the body cannot be meshed.
     """
     drawn = meshed_body(scene.body)
-    inch = style.size(WIDTH, HEIGHT)[0] if style.columns else WIDTH
+    height, row = 3.6, 0.24  # inch: of the picture, and of a row of its legend
+    inch = style.size(WIDTH, height)[0] if style.columns else WIDTH
     width = render.pixels(style, inch)
-    image = _render(drawn, scene, style, (width, round(width * HEIGHT / WIDTH)), inch)
+    image = _render(drawn, scene, style, (width, round(width * height / WIDTH)), inch)
     entries = _entries(drawn, scene)
-    columns = MOST_COLUMNS if inch > WIDTH / 2 + 1 else NARROW_COLUMNS
+    most_columns, narrow_columns = 4, 2  # of the legend
+    columns = most_columns if inch > WIDTH / 2 + 1 else narrow_columns
     with mpl.rc_context({**style.rc, "font.size": render.LETTERS}):
-        figure = Figure(figsize=(inch, ROW * (-(-len(entries) // columns) + 1)))
+        figure = Figure(figsize=(inch, row * (-(-len(entries) // columns) + 1)))
         legend(figure, entries, columns, loc="center", fontsize=None, frameon=False)
         return np.vstack([image, render.raster(figure, width / inch)])
 
@@ -204,8 +201,12 @@ def _render(
     side = float(np.ptp(drawn.points, axis=0).max())
     below = drawn.on_top(drawn.corner[None])
     top = (below if len(below) else drawn.points)[:, 2].max()
-    foot = np.array([*drawn.corner, top + GAP * side])
+    gap, plate = 0.05, 0.02
+    foot = np.array([*drawn.corner, top + gap * side])
     tip = foot + [0.0, 0.0, ARROW * side]
+    camera = (0.55, -1.0, 0.7)  # direction to the camera
+    edge = "#5a5f66"  # colour of the edges of elements
+    steep = -0.7  # vertical component of the normal of a base, at most
     with render.new_plotter(style, size) as plotter:
         plotter.enable_anti_aliasing("ssaa")  # draws at `SCALE` times the size
         skin = pv.PolyData.from_regular_faces(drawn.points, split(drawn.facets))
@@ -217,16 +218,16 @@ def _render(
         skin = skin.cell_data_to_point_data()  # colours change abruptly at sharp edges only
         plotter.add_mesh(skin, scalars="shade", rgb=True, smooth_shading=True, **LIT)
         edges = _opened(_edges(drawn, drawn.facets), drawn)
-        plotter.add_mesh(edges, color=EDGE, opacity=0.2, line_width=letter / 12)
+        plotter.add_mesh(edges, color=edge, opacity=0.2, line_width=letter / 12)
         for name in set(drawn.conditions) - {FREE}:
             held = drawn.conditions == name
             mark = pv.PolyData.from_regular_faces(drawn.points, split(drawn.facets[held]))
-            base = mark.face_normals[:, 2] < STEEP
+            base = mark.face_normals[:, 2] < steep
             if is_plate:  # its sides are too thin to see
                 mark = _edges(drawn, drawn.facets[held])
             elif base.any():
                 mark = mark.extract_cells(base).extract_surface(algorithm="dataset_surface")
-                mark = _opened(mark.extrude((0.0, 0.0, -PLATE * side), capping=True), drawn)
+                mark = _opened(mark.extrude((0.0, 0.0, -plate * side), capping=True), drawn)
             else:
                 continue
             plotter.add_mesh(mark, color=BOUNDARY[name], line_width=letter / 3, **LIT)
@@ -251,7 +252,7 @@ def _render(
         height = 1.3 * (1 + title.count("\n")) * letter / size[1]
         render.write(plotter, title, (0.01, 0.98 - height), letter, style.ink)
         shown = np.vstack([drawn.points, [foot, tip], render.scale_bar(drawn.points)])
-        render.Projection.of(CAMERA, shown, size[0] / size[1]).apply(plotter)
+        render.Projection.of(camera, shown, size[0] / size[1]).apply(plotter)
         return np.asarray(plotter.screenshot(None, return_img=True))
 
 
@@ -259,7 +260,8 @@ def _edges(drawn: MeshedBody, facets: Ints) -> Any:
     """Return the edges of facets (k, 6)."""
     import pyvista as pv
 
-    return pv.line_segments_from_points(drawn.points[facets[:, EDGES]].reshape(-1, 3))
+    edges = np.array([[0, 3], [3, 1], [1, 4], [4, 2], [2, 5], [5, 0]])  # of a six-node facet
+    return pv.line_segments_from_points(drawn.points[facets[:, edges]].reshape(-1, 3))
 
 
 def _opened(mesh: Any, drawn: MeshedBody) -> Any:

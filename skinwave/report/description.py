@@ -13,19 +13,14 @@ from skinwave.report.figures import run_label
 from skinwave.results.run import Run
 from skinwave.scene.scene import Body, Scene
 
-NAMED = 4  # lines that a sentence names
-SPOTS = {
-    "gaussian": "Gaussian focus",
-    "main_lobe": "focus S = sinc²(D/D₀)",
-    "array": "whole field of the array",
-}
-UNCERTAIN = (
-    "The pressure at the focus, and therefore every displacement, is known only to a factor of 2."
-)
-
 
 def _spot(pressure: MovingPressure) -> str:
-    return SPOTS.get(pressure.profile_name, "custom focal spot")
+    spots = {
+        "gaussian": "Gaussian focus",
+        "main_lobe": "focus S = sinc²(D/D₀)",
+        "array": "whole field of the array",
+    }
+    return spots.get(pressure.profile_name, "custom focal spot")
 
 
 def model_paragraphs(runs: Sequence[Run]) -> list[str]:
@@ -36,15 +31,20 @@ def model_paragraphs(runs: Sequence[Run]) -> list[str]:
     on_bodies = [run for run in runs if run.is_motion]
     notes = dict.fromkeys(run.scene.pressure.law.note for run in on_bodies if run.is_am)
     by_device = any(run.scene.load.of_kind.is_of_device for run in on_bodies)
-    return [*map(_model_text, groups.values()), *filter(None, notes), *[UNCERTAIN] * by_device]
+    uncertain = (
+        "The pressure at the focus, and therefore every displacement, is known only to a factor "
+        "of 2."
+    )
+    return [*map(_model_text, groups.values()), *filter(None, notes), *[uncertain] * by_device]
 
 
 def unresolved_lines(runs: Iterable[Run]) -> list[str]:
     """Return a sentence about unresolved lines for each duration of a Tacton."""
     unresolved = {run.scene.tacton.duration: run.unresolved for run in runs if run.unresolved}
+    named = 4  # lines that a sentence names
     return [
         f"A Tacton of {seconds:g} s is too short to resolve {plural(len(names), 'line')}: "
-        f"{', '.join(names[:NAMED])}{' and others' * (len(names) > NAMED)}. Use a longer Tacton."
+        f"{', '.join(names[:named])}{' and others' * (len(names) > named)}. Use a longer Tacton."
         for seconds, names in unresolved.items()
     ]
 

@@ -16,14 +16,6 @@ from skinwave.report.styles import Style
 
 FINE = 600  # frequencies of a drawn curve
 PALE = 0.35  # opacity of evanescent modes
-NAME_ROWS = 3  # of names of lines above the panels
-SHARE = 0.68  # of a figure's width for the curves, if the shapes are drawn too
-MOST_SHAPES = 4
-LABELS = (
-    "phase speed ω / |Re k|, m/s",
-    "1/e length 1 / |Im k|, mm",
-    "group speed dω / d Re k, m/s",
-)
 
 
 def colour(number: int) -> str:
@@ -48,19 +40,26 @@ def dispersion_figure(
     size = style.size(11.5 if thick else 8.5, 8.4)
     figure = Figure(figsize=size, layout="constrained")
     left: Figure | SubFigure = figure
+    share = 0.68  # of a figure's width for the curves, if the shapes are drawn too
     if thick:
-        left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(SHARE, 1 - SHARE))[0]
+        left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(share, 1 - share))[0]
         _shapes(right, curves, at)
     axes = left.subplots(3, 1, sharex=True, height_ratios=(1.25, 1, 1))
     _draw_curves(axes, curves, focus_speed)
-    for ax, label in zip(axes, LABELS, strict=True):
+    labels = (
+        "phase speed ω / |Re k|, m/s",
+        "1/e length 1 / |Im k|, mm",
+        "group speed dω / d Re k, m/s",
+    )
+    for ax, label in zip(axes, labels, strict=True):
         ax.set_xlim(0, curves.frequencies[-1])
         ax.set_ylabel(label)
         for frequency in lines.values():
             ax.axvline(frequency, **LINE_STYLE)
         ax.grid(alpha=0.25)
-    width = 72 * size[0] * (SHARE if thick else 1) - 8 * style.font  # points
-    name_lines(axes[0], lines, width, NAME_ROWS)
+    width = 72 * size[0] * (share if thick else 1) - 8 * style.font  # points
+    name_rows = 3  # of names of lines above the panels
+    name_lines(axes[0], lines, width, name_rows)
     axes[-1].set_xlabel("frequency, Hz")
     ink = mpl.rcParams["text.color"]
     entries: dict[str, dict[str, Any]] = {
@@ -112,7 +111,8 @@ def _shapes(figure: SubFigure, curves: DispersionCurves, at: float) -> None:
     number = int(np.argmin(np.abs(curves.frequencies - at)))
     known = [n for n, mode in enumerate(curves.modes) if mode.kinds[number]]
     known.sort(key=lambda n: abs(curves.modes[n].wavenumbers[number].imag))
-    for n in sorted(known[:MOST_SHAPES]):
+    most_shapes = 4
+    for n in sorted(known[:most_shapes]):
         shape = curves.modes[n].shapes[number]
         turned = shape * np.exp(-1j * np.angle(shape[0, 1])) / np.abs(shape).max()
         pale = 1.0 if curves.modes[n].is_wave[number] else PALE

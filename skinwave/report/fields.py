@@ -51,8 +51,6 @@ if TYPE_CHECKING:
     import pyvista as pv
     from matplotlib.axes import Axes
 
-AT_ONCE = 32  # times at which velocity and strain are computed together
-UNITS = {"displacement": "m", "velocity": "m/s", "strain": "1", "pressure": "Pa"}
 SLACK = 0.5  # sampling intervals by which a time may lie outside those of a field
 
 
@@ -139,8 +137,10 @@ class Field:
         """
         frames = [self.frame(time) for time in (self.times if times is None else times)]
         top = np.unique(self.mesh.facets["top"])
-        for start in range(0, len(frames), AT_ONCE):
-            some = frames[start : start + AT_ONCE]
+        at_once = 32  # times at which velocity and strain are computed together
+        units = {"displacement": "m", "velocity": "m/s", "strain": "1", "pressure": "Pa"}
+        for start in range(0, len(frames), at_once):
+            some = frames[start : start + at_once]
             now = self.times[some]
             pressure = np.zeros((len(some), len(self.mesh.points)))
             pressure[:, top] = self.scene.pressure(self.mesh.points[top], now)
@@ -156,7 +156,7 @@ class Field:
                 for name, values in data.items():
                     grid.point_data[name] = values[k]
                 grid.field_data["time_s"] = [time]
-                grid.field_data["units"] = [f"{name}: {UNITS[name]}" for name in data]
+                grid.field_data["units"] = [f"{name}: {units[name]}" for name in data]
                 yield grid
 
     def plot(self, time: float | None = None, *, ax: Axes | None = None) -> Axes:

@@ -19,8 +19,7 @@ from skinwave.results.run import Run
 
 P = ParamSpec("P")
 REPORT = STYLES["report"]
-LETTER, GAP = 0.55, 0.5  # width of a letter of a line's name, and of a gap, over the font size
-SUBSCRIPT, LEAST_SUBSCRIPT = 0.7, 7.0  # size over that of its letter; least size in points
+SUBSCRIPT = 0.7  # size over that of its letter; least size in points
 ROW = 1.45  # height of a row of names over the font size
 LINE_STYLE: dict[str, Any] = {"color": "0.6", "lw": 0.8, "ls": ":", "zorder": 0}
 
@@ -104,7 +103,8 @@ def line_symbol(name: str) -> str:
 
 def name_size() -> float:
     """Return the font size in points of names of lines, whose subscripts are legible."""
-    return max(small(), LEAST_SUBSCRIPT / SUBSCRIPT)
+    least_subscript = 7.0  # size over that of its letter; least size in points
+    return max(small(), least_subscript / SUBSCRIPT)
 
 
 def name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int = 1) -> None:
@@ -114,11 +114,12 @@ def name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int = 1
     """
     size, occupied = name_size(), [list[tuple[float, float]]() for _ in range(rows)]
     to_axes = ax.transScale + ax.transLimits
+    letter, gap = 0.55, 0.5  # width of a letter of a line's name, and of a gap, over the font size
     for name, frequency in lines.items():
         subscripts = sum(map(len, re.findall(r"_(\w+)", name)))
         signs = len(re.findall(r"[-+]", name))  # which have a space on both sides
         letters = len(name.replace("_", "")) - (1 - SUBSCRIPT) * subscripts + signs
-        half = size * (LETTER * letters + GAP) / 2
+        half = size * (letter * letters + gap) / 2
         middle = width * to_axes.transform((frequency, 1.0))[0]
         low, high = middle - half, middle + half
         free = [

@@ -19,11 +19,8 @@ from skinwave.results.views import View
 from skinwave.system.effort import Progress, silent
 
 SHORTEST = 4.0  # s, of a film
-SHORTEST_FRAME = 0.04  # s
-ROUND_OFF = 1e-4  # of a turn
 FORMATS = {".gif": "image/gif", ".mp4": "video/mp4"}
 ENCODER = ("imageio", "imageio_ffmpeg")
-SHADES = 240  # colours of a GIF that are chosen from its frames; the others are fixed
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +83,8 @@ def played_text(view: View) -> str:
     """Describe which part of a motion is played, and whether it repeats without a jump."""
     span, whole = f"{significant(1e3 * view.period)} ms", playback.whole_period(view.scene.pressure)
     jump = playback.phase_jump(view.scene.tacton, view.period)
-    if jump < ROUND_OFF:
+    round_off = 1e-4  # of a turn
+    if jump < round_off:
         return f"one period of {span}, which repeats without a jump"
     pattern = f"{significant(1e3 * whole)} ms long" if whole else "that never repeats exactly"
     turn = f"phases jump by up to {100 * jump:.2g} % of a turn at each repetition"
@@ -95,7 +93,8 @@ def played_text(view: View) -> str:
 
 def duration(frames: int) -> float:
     """Return the duration in s of a film with a number of frames."""
-    return max(SHORTEST, SHORTEST_FRAME * frames)
+    shortest_frame = 0.04  # s
+    return max(SHORTEST, shortest_frame * frames)
 
 
 def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
@@ -106,7 +105,8 @@ def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
     page = [style.paper, style.ink, *COLOURS.values(), *SPARE]
     exact = [int(colour[k : k + 2], 16) for colour in page for k in (1, 3, 5)]
     palette = Pillow.new("P", (1, 1))
-    palette.putpalette(exact + (some.quantize(SHADES, kmeans=1).getpalette() or []))
+    shades = 240  # colours of a GIF that are chosen from its frames; the others are fixed
+    palette.putpalette(exact + (some.quantize(shades, kmeans=1).getpalette() or []))
     shown = [
         Pillow.fromarray(frame).quantize(palette=palette, dither=Pillow.Dither.NONE)
         for frame in frames

@@ -24,13 +24,9 @@ from skinwave.scene.scene import Scene
 from skinwave.typing import Floats, Ints
 
 PIXELS = 201  # along a side of a snapshot
-SNAPSHOT, SIDE, ALONE = 2.7, 3.85, 5.0  # inch: of a snapshot, of a map with its bar, of one map
-KERNEL, THRESHOLD = "#ff9e4a", "#ff2fd0"  # lines: the kernel's -20 dB, the detection threshold
+ALONE = 5.0  # inch: of a snapshot, of a map with its bar, of one map
+KERNEL = "#ff9e4a"  # lines: the kernel's -20 dB, the detection threshold
 MEASURED_EDGE = COLOURS["measured"]
-CONE = 0.025  # m, length of the lines at the Mach angle
-FEWEST_PIXELS = 250  # along the longer side of a map, which is interpolated to be smooth
-OUTLINES = {"white": "0.4", "black": "white"}  # of lines, to be seen on every background
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 CAPTION = (
     "Outside the dashed line the point kernel is below a tenth of its largest value; the body "
     "moves there because waves propagate."
@@ -78,8 +74,11 @@ def surfaces_figure(
     """
     kernel = next((each for each in surfaces.values() if each.quantity is PRESSURE), None)
     alone = len(surfaces) == 1
-    figure, axes = panels(len(surfaces), style, ALONE if alone else SIDE)
+    side = 3.85  # inch: of a snapshot, of a map with its bar, of one map
+    figure, axes = panels(len(surfaces), style, ALONE if alone else side)
     entries: dict[str, Any] = _path_entry(scene, "white")
+    threshold = "#ff2fd0"  # lines: the kernel's -20 dB, the detection threshold
+    raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
         quantity, power = surface.quantity, _power_of_ten(surface.unit_rms)
         shown = np.maximum(_finer(surface.unit_rms), 0.0) / 10.0**power
@@ -98,14 +97,14 @@ def surfaces_figure(
             if _draw_border(ax, field, field.rms, level, colour, dashes):
                 entries[name] = {**_outlined(colour), "ls": dashes}
         level_map = surface.level
-        if level_map is not None and _draw_border(ax, surface, level_map, 0.0, THRESHOLD, "solid"):
-            entries["detection threshold"] = {"color": THRESHOLD, "ls": "solid"}
+        if level_map is not None and _draw_border(ax, surface, level_map, 0.0, threshold, "solid"):
+            entries["detection threshold"] = {"color": threshold, "ls": "solid"}
         draw_path(ax, scene, "white")
         extend = _draw_measured(ax, surface, image, measured, power) if measured else "neither"
         note = f" ({surface.note})" * bool(surface.note and not alone)
         ax.set_title(label(column) + note, fontsize="medium")
         symbol = "" if quantity in (DISPLACEMENT, PRESSURE) else f" ${quantity.symbol}$,"
-        factor = f"10{str(power).translate(RAISED)} " if power else ""
+        factor = f"10{str(power).translate(raised)} " if power else ""
         title = f"RMS about the mean,{symbol} {factor}{quantity.shown}"
         figure.colorbar(image, ax=ax, label=title, extend=extend)
     if measured:
@@ -131,9 +130,10 @@ def _path_entry(scene: Scene, ink: str) -> dict[str, dict[str, Any]]:
 
 def _outlined(ink: str) -> dict[str, Any]:
     """Return the properties of a line that is visible on every background."""
-    if ink not in OUTLINES:
+    outlines = {"white": "0.4", "black": "white"}  # of lines, to be seen on every background
+    if ink not in outlines:
         return {"color": ink}
-    return {"color": ink, "path_effects": [withStroke(linewidth=2.3, foreground=OUTLINES[ink])]}
+    return {"color": ink, "path_effects": [withStroke(linewidth=2.3, foreground=outlines[ink])]}
 
 
 def _power_of_ten(values: Floats) -> int:
@@ -153,7 +153,8 @@ def _finer(field: Floats) -> Floats:
         return field
     missing = np.isnan(field)
     nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
-    times = -(-FEWEST_PIXELS // max(field.shape))
+    fewest_pixels = 250  # along the longer side of a map, which is interpolated to be smooth
+    times = -(-fewest_pixels // max(field.shape))
     fine = tuple(np.linspace(0, n - 1, times * (n - 1) + 1) for n in field.shape)
     values = RectBivariateSpline(rows, columns, field[tuple(nearest)])(*fine)
     off = RegularGridInterpolator((rows, columns), gaussian_filter(missing.astype(float), 1.0))
@@ -226,7 +227,8 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
     reach = np.min([np.abs(view.places).max(axis=0) for view in views], axis=0)  # common to all
     raster = np.stack(np.meshgrid(*(np.linspace(-r, r, PIXELS) for r in reach)), axis=-1)
     extent = tuple(1e3 * np.outer(reach, (-1, 1)).ravel())
-    size = style.size(SNAPSHOT * count + 2.0, SNAPSHOT * len(views) + 1.0)
+    snapshot = 2.7  # inch: of a snapshot, of a map with its bar, of one map
+    size = style.size(snapshot * count + 2.0, snapshot * len(views) + 1.0)
     if style.is_narrow:
         size = size[0], 0.4 * size[0] * len(views) + 0.9
     figure = Figure(figsize=size, layout="constrained")
@@ -292,7 +294,8 @@ def _draw_focus(ax: Axes, view: View, time: float) -> None:
         return
     ahead = path.position(time + 1e-5) - focus
     heading = np.arctan2(ahead[1], ahead[0])
-    reach = np.linspace(0, CONE, PIXELS)
+    cone = 0.025  # m, length of the lines at the Mach angle
+    reach = np.linspace(0, cone, PIXELS)
     for side in (-1, 1):
         back = heading + np.pi + side * angle
         line = focus + reach[:, None] * [np.cos(back), np.sin(back)]

@@ -20,12 +20,8 @@ if TYPE_CHECKING:
     from skinwave.results.comparison import Agreement
     from skinwave.scene.scene import Scene
 
-BODY, PATH, FOCUS, PROBE = "#e8d5c4", "#222222", "#D55E00", "#0072B2"
-SPOT_REACH = 4.0  # widths of a focal spot within which its contour is drawn
-HALF = 0.5  # of the pressure at a focus, on its contour
+BODY, PATH = "#e8d5c4", "#222222"
 NARROW = 0.5  # inch per point of font size: a narrower legend has one column
-MOST_NUMBERED = 20  # probes with a number
-MOST_ROWS = 12  # probes in a table
 
 
 def _line(kind: str, parts: Iterable[str]) -> str:
@@ -132,7 +128,8 @@ def agreement_page(agreement: "Agreement") -> str:
          f"{1e3 * agreement.spread_candidate[drop]:.3g} mm (candidate)"]
         for drop, reference in agreement.spread_reference.items()
     ]  # fmt: skip
-    tables = [drawing.table(facts), drawing.table(rows[:MOST_ROWS], header)]
+    most_rows = 12  # probes in a table
+    tables = [drawing.table(facts), drawing.table(rows[:most_rows], header)]
     return drawing.page("Candidate against reference", b"", tables)
 
 
@@ -145,9 +142,11 @@ def draw_scene(scene: "Scene", ax: "Axes | None") -> "Axes":
         ax.plot(x, y, color=PATH, lw=1.2, ls="dotted", label="path")
     _draw_foci(ax, scene)
     x, y = 1e3 * scene.probe_points.T
-    ax.plot(x, y, ls="none", marker="o", ms=4, color=PROBE, label="probes")
-    for k in range(min(len(x), MOST_NUMBERED)):
-        ax.annotate(str(k), (x[k], y[k]), xytext=(3, 3), textcoords="offset points", color=PROBE,
+    probe = "#0072B2"
+    ax.plot(x, y, ls="none", marker="o", ms=4, color=probe, label="probes")
+    most_numbered = 20  # probes with a number
+    for k in range(min(len(x), most_numbered)):
+        ax.annotate(str(k), (x[k], y[k]), xytext=(3, 3), textcoords="offset points", color=probe,
                     fontsize=drawing.small())  # fmt: skip
     narrow = ax.figure.get_figwidth() < NARROW * drawing.small()  # type: ignore[union-attr]
     compact = {"borderaxespad": 0.2, "handlelength": 1.5, "columnspacing": 1.0}
@@ -194,13 +193,16 @@ def _draw_foci(ax: "Axes", scene: "Scene") -> None:
     """Draw the contour of half the pressure around every focus at the start."""
     tacton, width = scene.tacton, spot_width(scene.pressure.height)
     phases = np.mod(tacton.trajectory.phase(0.0) + np.array(tacton.foci), 1.0)
-    across = SPOT_REACH * width * np.linspace(-1, 1, 81)
+    spot_reach = 4.0  # widths of a focal spot within which its contour is drawn
+    across = spot_reach * width * np.linspace(-1, 1, 81)
     grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
     shape = len(across), len(across)
+    focus = "#D55E00"
+    half = 0.5  # of the pressure at a focus, on its contour
     for centre in tacton.trajectory.at_phase(phases):
         places = grid + centre
         spot = scene.pressure.spot(places, centre).reshape(shape)
         x, y = 1e3 * places.reshape(*shape, 2).transpose(2, 0, 1)
-        ax.contour(x, y, spot, [HALF * spot.max()], colors=FOCUS, linewidths=1.5)
+        ax.contour(x, y, spot, [half * spot.max()], colors=focus, linewidths=1.5)
     several = f"{len(tacton.foci)} foci" if len(tacton.foci) > 1 else "focus"
-    ax.plot([], [], color=FOCUS, lw=1.5, label=f"{several}, half pressure")
+    ax.plot([], [], color=focus, lw=1.5, label=f"{several}, half pressure")

@@ -21,7 +21,6 @@ COLOURS = {
     "measured": "#CC79A7",
 }
 DASHES: dict[str, Any] = {"paper-sheet": (0, (5, 1))}  # of waveforms, for print in grey
-MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
 LABELS = {
     **{model.name: model.label for model in (SAME_LOAD, PUBLISHED)},
     "paper-sheet": "paper sheet",
@@ -44,7 +43,8 @@ def ink_colour(column: str) -> str:
 
 def marker(column: str) -> str:
     """Return the marker of a `Run.column`."""
-    return MARKERS.get(column, "^")
+    markers = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
+    return markers.get(column, "^")
 
 
 def line_style(column: str) -> dict[str, Any]:

@@ -31,15 +31,11 @@ Interpolation = Callable[[Floats], Floats]  # values (s,) of a surface -> values
 CAMERAS = {  # directions from the body to the camera
     "tilted": (-0.45, -1.0, 0.85), "front": (0.0, -1.0, 0.45), "top": (0.0, 0.0, 1.0),
 }  # fmt: skip
-# Part of a panel that bodies fill, along its width and height, and the middle of that height.
-FILLED, MIDDLE = (0.92, 0.74), 0.44
 LARGEST_DRAWN = 0.06  # of the body's width, for the largest motion
-BARS = (10.0, 5.0, 2.0, 1.0)  # mm, lengths of scale bars
 FONT = findfont("DejaVu Sans")  # of all figures
 COLUMN = 0.26  # width of the colour bar over the height of the picture
 WIDTH = 1600  # pixels, of a picture that is not for print
 PAGE, LETTERS = 7.0, 8.0  # inch, width of a page; points, size of letters at that width
-LEAST_LETTER = 11.0  # pixels, in films
 SHARP = 35.0  # degrees, of edges that are not smoothed
 LIFT = 0.004  # of the body's size: height of path, probes and focus above the surface
 PATH, FOCUS, PROBE = "black", "black", "#ffd000"  # colours of marks
@@ -145,7 +141,10 @@ def stage(
     """
     width, height = panel or style.panel
     column = round(COLUMN * height)
-    letter = max(LETTERS / 72 * (width * len(views) + column) / inch, LEAST_LETTER)
+    least_letter = 11.0  # pixels, in films
+    letter = max(LETTERS / 72 * (width * len(views) + column) / inch, least_letter)
+    # Part of a panel that bodies fill, along its width and height, and the middle of that height.
+    filled, middle = (0.92, 0.74), 0.44
     with new_plotter(style, (width, height), len(views)) as plotter:
         limits, title = _colour_scale(views)
         bar = _colour_bar(limits, title, style, letter, (column, height))
@@ -161,7 +160,7 @@ def stage(
         shown = [each for panel in panels for each in (
             1e3 * panel.view.points[panel.nodes], scale_bar(1e3 * panel.view.points)
         )]  # fmt: skip
-        fitting = Projection.of(CAMERAS[camera], np.vstack(shown), width / height, FILLED, MIDDLE)
+        fitting = Projection.of(CAMERAS[camera], np.vstack(shown), width / height, filled, middle)
         for k in range(len(views)):
             plotter.subplot(0, k)
             fitting.apply(plotter)
@@ -325,7 +324,8 @@ def scale_bar(points: Floats) -> Floats:
     """Return the ends (2, 3) in mm of a scale bar along x, in front of points (n, 3) in mm."""
     left, front, bottom = points.min(axis=0)
     side = float(np.ptp(points[:, :2], axis=0).max())
-    length = next(length for length in BARS if length <= side / 4 or length == BARS[-1])
+    bars = (10.0, 5.0, 2.0, 1.0)  # mm, lengths of scale bars
+    length = next(length for length in bars if length <= side / 4 or length == bars[-1])
     front -= side / 10
     return np.array([[left, front, bottom], [left + length, front, bottom]])
 

@@ -9,9 +9,6 @@ from functools import cache
 
 from meshes import subprocess_call
 
-PACKAGES = "libegl1 libgl1-mesa-dri"
-TIMEOUT = 60.0  # s
-
 
 @dataclass(frozen=True, kw_only=True)
 class Renderer:
@@ -36,15 +33,17 @@ def begin() -> "Future[Renderer]":
 
 
 def _test() -> Renderer:
+    packages = "libegl1 libgl1-mesa-dri"
+    timeout = 60.0  # s
     try:
-        name = subprocess_call.call(draw_sphere, timeout=TIMEOUT)
+        name = subprocess_call.call(draw_sphere, timeout=timeout)
         return Renderer(is_available=True, detail=name)
     except TimeoutError:
-        detail = f"opening a window takes more than {TIMEOUT:g} s"
+        detail = f"opening a window takes more than {timeout:g} s"
     except ModuleNotFoundError as error:
         detail = f"the Python package {error.name} is missing; install it"
     except Exception:
-        detail = f"the GL libraries are missing; on Debian, run apt install {PACKAGES}"
+        detail = f"the GL libraries are missing; on Debian, run apt install {packages}"
     return Renderer(is_available=False, detail=detail)
 
 

@@ -32,26 +32,11 @@ TITLES = (
     "waveform about its mean, over the model's largest",
     "spectrum, dB re the model's largest line",
 )
-SHORT_TITLES = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
-MARKED = ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d")  # lines that a Tacton's figure names
-MOST_COLUMNS = 3  # of a legend
-LETTER, HANDLE = 0.07, 0.5  # inch: of a letter of a legend, and of a handle with its space
 FLOOR = -80.0  # dB
 HIGHEST_SHOWN = 650.0  # Hz
-LOWEST_SHOWN = 8.0  # Hz: the mean and its leakage lie below
-SETTLE = 0.25  # part of the response in which the transient decays
-LOWEST_LEVEL = -30.0  # dB re threshold: weaker lines are not drawn
-# Least ratio of the lowest line to the lowest decade, largest ratio of all values, and the end of
-# the axis over that decade, whose label then does not touch that of the other axis.
-BELOW, MOST_RATIO, CORNER = 1.5, 1e4, 0.6
-SMALL_NUMBER = 1e-4  # at least: written without an exponent
-NAME_ROWS, MOST_NAMED = 3, 12  # of names above a panel of sensation levels
 CURVE: dict[str, Any] = {"color": "0.45", "lw": 1.5}
 THRESHOLD_BAND: dict[str, Any] = {"color": "0.5", "alpha": 0.25}
 MOST_LINES = 6  # of a measurement
-NORMAL_95 = 1.96
-SHIFT = 0.12  # of the distance between two places, by which models are drawn apart
-WEAKEST_PHASE = 0.02  # of a line's largest amplitude: weaker lines have no phase drawn
 
 
 @with_style
@@ -72,14 +57,16 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
         _draw_waveforms(axes[p, 0], runs, p)
         _draw_spectra(axes[p, 1], runs, p)
         axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
-    titles = SHORT_TITLES if narrow else TITLES
+    short_titles = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
+    titles = short_titles if narrow else TITLES
     axes[0, 0].set_title(f"{title}\n{titles[0]}", fontsize="medium", parse_math=False)
     pad = None
+    marked = ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d")  # lines that a Tacton's figure names
     if narrow:
         axes[0, 1].set_yticks(np.arange(FLOOR, 1, 40))
     else:
         pad, frequencies = 4 + ROW * name_size(), runs[0].frequencies
-        lines = {name: frequencies[name] for name in MARKED if name in frequencies}
+        lines = {name: frequencies[name] for name in marked if name in frequencies}
         name_lines(axes[0, 1], lines, 72 * axes[0, 1].get_position().width * size[0])
     axes[0, 1].set_title(titles[1], fontsize="medium", pad=pad)
     axes[-1, 0].set_xlabel("time, ms")
@@ -99,8 +86,10 @@ def _legend(figure: Figure, runs: list[Run]) -> int:
         entries[f"open: {', '.join(kinds)}"] = {
             "color": "0.3", "marker": "^", "mfc": "none", "ls": ""
         }  # fmt: skip
-    columns = len(entries) if len(entries) <= MOST_COLUMNS else -(-len(entries) // 2)
-    room = int(figure.get_figwidth() / (LETTER * max(map(len, entries)) + HANDLE))
+    most_columns = 3  # of a legend
+    columns = len(entries) if len(entries) <= most_columns else -(-len(entries) // 2)
+    letter, handle = 0.07, 0.5  # inch: of a letter of a legend, and of a handle with its space
+    room = int(figure.get_figwidth() / (letter * max(map(len, entries)) + handle))
     columns = 1 if figure.get_figwidth() < NARROW else max(1, min(columns, room))
     return legend(figure, entries, columns, loc="upper center", fontsize=None)
 
@@ -118,7 +107,8 @@ def _common_end(run: Run, runs: list[Run]) -> slice:
 def _remove_mean(run: Run, runs: list[Run]) -> Floats:
     """Return the drawn part (t, p) of the response about its mean in the steady state."""
     motion = run.response.values
-    return motion[_common_end(run, runs)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
+    settle = 0.25  # part of the response in which the transient decays
+    return motion[_common_end(run, runs)] - motion[int(settle * len(motion)) :].mean(axis=0)
 
 
 def _largest(run: Run, runs: list[Run]) -> float:
@@ -140,9 +130,10 @@ def _draw_waveforms(ax: Axes, runs: list[Run], p: int) -> None:
 
 
 def _draw_spectra(ax: Axes, runs: list[Run], p: int) -> None:
+    lowest_shown = 8.0  # Hz: the mean and its leakage lie below
     for run in runs:
         f, amplitude = spectrum(run.response, "blackmanharris")
-        moving = f > LOWEST_SHOWN
+        moving = f > lowest_shown
         top = max(float(amplitude[moving].max()), np.finfo(float).tiny)
         level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
         style = {**line_style(run.column), "zorder": _depth(run)}
@@ -184,10 +175,11 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     width = 72 * size[0] / shape[1] - 8 * style.font  # points
     for ax, run in zip(axes, runs, strict=False):
         _draw_levels(ax, run, probe, width)
+    small_number = 1e-4  # at least: written without an exponent
     if runs:
         low, high = _level_limits([*axes])
         axes[0].set_ylim(low, high)
-        if low > SMALL_NUMBER:  # without small exponents
+        if low > small_number:  # without small exponents
             axes[0].yaxis.set_major_formatter("{x:g}")
     entries: dict[str, dict[str, Any]] = {}
     if any(run.is_skin for run in runs):
@@ -226,9 +218,10 @@ def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
     table = run.in_pulses if run.is_skin else run.table
     amplitudes = {name: float(values[probe]) for name, values in table.amplitudes.items()}
     names = sorted(amplitudes, key=lambda name: -amplitudes[name])
+    lowest_level = -30.0  # dB re threshold: weaker lines are not drawn
     if run.is_skin:
         levels = sensation_levels(run, probe)
-        names = [name for name, level in levels.items() if level > LOWEST_LEVEL]
+        names = [name for name, level in levels.items() if level > lowest_level]
         f = np.geomspace(LOWEST, HIGHEST, 300)
         curve, factor = 1e6 * threshold(f), 10 ** (BAND / 20)
         ax.plot(f, curve, **CURVE)
@@ -242,10 +235,11 @@ def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
         ax.plot(peak.frequency, per_unit * peak.amplitudes[probe], ls="none", mfc="none", **style)
     ax.set(xscale="log", yscale="log", xlim=(LOWEST, HIGHEST), xlabel="frequency, Hz")
     ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
-    ax.set_title(run_label(run), pad=4 + NAME_ROWS * ROW * name_size())
+    name_rows, most_named = 3, 12  # of names above a panel of sensation levels
+    ax.set_title(run_label(run), pad=4 + name_rows * ROW * name_size())
     ax.grid(alpha=0.25)
-    named = {name: table.frequencies[name] for name in names[:MOST_NAMED]}
-    name_lines(ax, named, width, NAME_ROWS)
+    named = {name: table.frequencies[name] for name in names[:most_named]}
+    name_lines(ax, named, width, name_rows)
 
 
 def _level_limits(axes: Sequence[Axes]) -> tuple[float, float]:
@@ -254,8 +248,11 @@ def _level_limits(axes: Sequence[Axes]) -> tuple[float, float]:
                             if line.get_transform() == ax.transData])  # fmt: skip
     shown = shown[shown > 0]
     low, high = (shown.min(), shown.max()) if len(shown) else (0.1, 1.0)
-    low = max(low, high / MOST_RATIO)
-    bottom = CORNER * 10.0 ** np.floor(np.log10(low / BELOW))
+    # Least ratio of the lowest line to the lowest decade, largest ratio of all values, and the end
+    # of the axis over that decade, whose label then does not touch that of the other axis.
+    below, most_ratio, corner = 1.5, 1e4, 0.6
+    low = max(low, high / most_ratio)
+    bottom = corner * 10.0 ** np.floor(np.log10(low / below))
     return bottom, 10.0 ** np.ceil(np.log10(high))
 
 
@@ -287,13 +284,16 @@ def lines_figure(
     strongest = np.sort(np.argsort(-np.abs(measured).max(axis=1), kind="stable")[:MOST_LINES])
     figure = Figure(figsize=style.size(10.5, 1.45 * len(strongest) + 1.7), layout="constrained")
     axes = figure.subplots(len(strongest), 2, sharex=True, squeeze=False)
+    normal_95 = 1.96
+    shift = 0.12  # of the distance between two places, by which models are drawn apart
+    weakest_phase = 0.02  # of a line's largest amplitude: weaker lines have no phase drawn
     for (left, right), k in zip(axes, strongest, strict=True):
-        noise = NORMAL_95 * np.nan_to_num(error[k])
+        noise = normal_95 * np.nan_to_num(error[k])
         _draw_noise(left, right, quantity.per_unit * np.abs(measured[k]), quantity.per_unit * noise)
         for n, (column, model) in enumerate(models.items()):
-            at = np.arange(len(places)) + SHIFT * (n - (len(models) - 1) / 2)
+            at = np.arange(len(places)) + shift * (n - (len(models) - 1) / 2)
             size = np.abs(model[k])
-            strong = size > WEAKEST_PHASE * size.max(initial=0.0)
+            strong = size > weakest_phase * size.max(initial=0.0)
             phase = np.where(strong, np.degrees(np.angle(model[k] * measured[k].conj())), np.nan)
             markers, filled = _markers(column), differs[column][k]
             for mask, face in ((filled, markers["color"]), (~filled, "none")):

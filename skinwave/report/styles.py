@@ -10,9 +10,7 @@ from simple_model.choices import choose
 # Settings for writing files: text as text in SVG, TrueType fonts in PDF.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
-NARROWEST, WIDEST = 2.0, 15.0  # inch, of a figure
 NARROW = 5.0  # inch: narrower figures have one column of panels
-ONE_COLUMN = 6.5  # inch, with letters of 10 points: wider figures span two columns in print
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +41,8 @@ class Style:
         """Return the size in inches of a figure that has a given size with letters of 10 points."""
         if self.columns is None:
             return width * self.zoom, height * self.zoom
-        column = self.columns[width > ONE_COLUMN]
+        one_column = 6.5  # inch, with letters of 10 points: wider figures span two columns in print
+        column = self.columns[width > one_column]
         return column, column * height / width
 
     @property
@@ -76,9 +75,10 @@ def style(name: str, width: float | None = None) -> Style:
     chosen = STYLES[choose("style", name, STYLES)]
     if width is None:
         return chosen
-    if not NARROWEST <= width <= WIDEST:
+    narrowest, widest = 2.0, 15.0  # inch, of a figure
+    if not narrowest <= width <= widest:
         raise ValueError(
-            f"width = {width:g} inch must be {NARROWEST:g} to {WIDEST:g} inch. One column of a "
+            f"width = {width:g} inch must be {narrowest:g} to {widest:g} inch. One column of a "
             "journal is 3.5 inch wide, two columns are 7 inch wide"
         )
     return replace(STYLES["print"], columns=(width, width), ink=chosen.ink, paper=chosen.paper)

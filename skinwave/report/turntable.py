@@ -15,10 +15,6 @@ from skinwave.system.scripts import bundle, json_for_script
 from skinwave.system.templates import render
 from skinwave.typing import Complex, Floats
 
-NEGLIGIBLE_LINE_RATIO = 3e-3  # to the strongest line: weaker lines are left out
-MOST_LINES = 32
-DRAWN_POINTS = 121  # of each path
-
 
 def turntable(view: View, frame: int) -> str:
     """Return a page with a moving view that starts at a frame."""
@@ -50,8 +46,10 @@ def motion_lines(frames: Any, period: float) -> tuple[Floats, Complex]:
         lines[-1] /= 2
     strength = np.abs(lines).max(axis=1)
     strength[0] = 0.0
-    strongest = np.argsort(-strength)[:MOST_LINES]
-    strong = np.sort(strongest[strength[strongest] > NEGLIGIBLE_LINE_RATIO * strength.max()])
+    most_lines = 32
+    strongest = np.argsort(-strength)[:most_lines]
+    negligible_line_ratio = 3e-3  # to the strongest line: weaker lines are left out
+    strong = np.sort(strongest[strength[strongest] > negligible_line_ratio * strength.max()])
     return strong / period, lines[strong]
 
 
@@ -59,8 +57,9 @@ def focus_places(pressure: MovingPressure, times: Floats) -> tuple[Floats, Float
     """Return the paths (m, q, 2) and the foci (t, k, 2) at times (t,), in m."""
     tacton, path = pressure.tacton, pressure.tacton.trajectory
     n = tacton.n_paths
+    drawn_points = 121  # of each path
     # No line connects the end of a path to the beginning of the next.
-    along = (np.arange(n)[:, None] + np.linspace(0, 1 - 1e-6, DRAWN_POINTS)) / n
+    along = (np.arange(n)[:, None] + np.linspace(0, 1 - 1e-6, drawn_points)) / n
     paths = path.at_phase(along) if tacton.drawing_frequency else np.zeros((0, 0, 2))
     within = np.mod(tacton.drawing_frequency * times, 1.0) / n  # each focus stays on its own path
     foci = [path.at_phase((within + phase) % 1) for phase in tacton.foci]
