@@ -7,11 +7,6 @@ from skinwave.models import named
 from skinwave.system.effort import versions
 
 VERSION, RELEASED = "1.0.0", 2026  # as CITATION.cff has them
-TACTONS = (
-    "C. Lim, H. Seifi, G. Park: An Interactive Tool for Simulating Mid-Air Ultrasound Tactons on "
-    "the Skin. Extended Abstracts of the CHI Conference on Human Factors in Computing Systems "
-    "(CHI EA '24), 2024. doi 10.1145/3613905.3650981"
-)
 SOLVERS = {
     "pardiso": "O. Schenk, K. Gärtner: Solving unsymmetric sparse systems of linear equations with "
     "PARDISO. Future Generation Computer Systems 20 (2004) 475-487. "
@@ -74,7 +69,12 @@ def cite(*responses: Response) -> Citations:
     sources = [source for name in models for source in named(name).sources]
     used = {response.effort.solver for response in responses}
     solvers = [text for name, text in SOLVERS.items() if any(name in each for each in used)]
+    tactons = (
+        "C. Lim, H. Seifi, G. Park: An Interactive Tool for Simulating Mid-Air Ultrasound Tactons "
+        "on the Skin. Extended Abstracts of the CHI Conference on Human Factors in Computing "
+        "Systems (CHI EA '24), 2024. doi 10.1145/3613905.3650981"
+    )
     return Citations(
         sentence=f"Responses were computed with skinwave {release} by {methods}.",
-        references=tuple(dict.fromkeys([program, TACTONS, *sources, *solvers])),
+        references=tuple(dict.fromkeys([program, tactons, *sources, *solvers])),
     )

@@ -20,9 +20,7 @@ from skinwave.typing import Floats
 PRESENT = -60.0  # a line this weak is visible above a vibrometer's noise
 ABSENT = -120.0
 MUCH_LOWER = -20.0  # a tenth of the amplitude
-NO_LINE = -300.0
 ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
-PEAK_REACH = 6.0  # Hz from a line within which its spectral peak is searched
 NO_PEAK = "a line that the claim is about has no spectral peak next to it"
 
 
@@ -298,7 +296,8 @@ def multiple_levels(run: NamedLines) -> Floats:
     dB re f_AM there. Sums and differences of both frequencies are not "these frequency harmonics".
     """
     names = [n for n in rivals(run) if not ("f_AM" in n and "f_d" in n)]
-    return _probe_levels(run, names, "f_AM").max(axis=0, initial=NO_LINE)
+    no_line = -300.0
+    return _probe_levels(run, names, "f_AM").max(axis=0, initial=no_line)
 
 
 def strongest_rival(run: NamedLines) -> tuple[str, float]:
@@ -321,7 +320,8 @@ def _peak(run: NamedLines, line: str) -> float:
     """
     f, amplitude = run.spectrum
     x = amplitude[:, int(np.argmax(run.lines[line]))]
-    near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= PEAK_REACH)
+    peak_reach = 6.0  # Hz from a line within which its spectral peak is searched
+    near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= peak_reach)
     if len(near) < 3:  # the Tacton is too short
         return np.inf
     top = near[np.argmax(x[near])]

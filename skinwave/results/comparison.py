@@ -18,9 +18,6 @@ from skinwave.results.run import ASSESSED
 from skinwave.system.drawing import call_report
 from skinwave.typing import Complex, Floats
 
-ROUND_OFF = 1e-6  # of the largest RMS motion: weaker lines are round-off
-LOWEST_PHASE_LEVEL = -20.0  # dB re a line's largest amplitude: below it a phase means little
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Agreement:
@@ -153,12 +150,14 @@ def line_phasors(response: Response, frequencies: tuple[float, ...]) -> np.ndarr
     if not frequencies:
         return np.zeros((0, len(response.probes)), np.complex128)
     amplitudes = phasors(response, frequencies)
-    return np.where(np.abs(amplitudes) > ROUND_OFF * moving_rms(response).max(), amplitudes, 0)
+    round_off = 1e-6  # of the largest RMS motion: weaker lines are round-off
+    return np.where(np.abs(amplitudes) > round_off * moving_rms(response).max(), amplitudes, 0)
 
 
 def _is_strong(line: np.ndarray) -> np.ndarray:
     size = np.abs(line)
-    return (size > 0) & (size >= 10 ** (LOWEST_PHASE_LEVEL / 20) * size.max(initial=0.0))
+    lowest_phase_level = -20.0  # dB re a line's largest amplitude: below it a phase means little
+    return (size > 0) & (size >= 10 ** (lowest_phase_level / 20) * size.max(initial=0.0))
 
 
 def _align(reference: Response, candidate: Response) -> tuple[Floats, Floats]:

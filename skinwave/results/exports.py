@@ -14,9 +14,7 @@ from skinwave.results.views import View, field_frames
 from skinwave.system.table import Table
 
 PARAVIEW_ORDER = [0, 1, 2, 3, 5, 4]  # of the components of a tensor
-UNITS = {"displacement_m": "m", "strain": "1", "stress_pa": "Pa"}
 FULL_SCALE = 32767  # of 16-bit sound
-PLAIN_LETTERS = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # for file names
 
 
 def write_probes(stem: Path, response: Response) -> None:
@@ -42,7 +40,8 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
     motion = response.values[:, probe] - response.values[:, probe].mean()
     largest = float(np.abs(motion).max())
     samples = np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16)
-    unit = response.record.shown.translate(PLAIN_LETTERS)
+    plain_letters = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # for file names
+    unit = response.record.shown.translate(plain_letters)
     x, y = 1e3 * response.probes[probe]
     scale = f"{response.record.per_unit * largest:.4g}_{unit}"
     path = folder / f"probe_{x:g}_{y:g}_mm_full_scale_{scale}.wav"
@@ -81,7 +80,8 @@ def _grid(view: View, frame: int, number: int) -> Any:
     if tensors is not None:
         grid["strain"] = tensors.strain[number][:, PARAVIEW_ORDER]
         grid["stress_pa"] = tensors.stress[number][:, PARAVIEW_ORDER]
-    grid.field_data["units"] = [f"{name}: {UNITS[name]}" for name in grid.point_data]
+    units = {"displacement_m": "m", "strain": "1", "stress_pa": "Pa"}
+    grid.field_data["units"] = [f"{name}: {units[name]}" for name in grid.point_data]
     return grid
 
 

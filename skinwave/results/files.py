@@ -17,20 +17,18 @@ from skinwave.results.run import Run
 from skinwave.scene.file import dumps
 from skinwave.system.table import Table
 
-# Columns of lines.csv; those of other quantities follow.
-PLACE_COLUMNS = ("tacton", "body", "model", "probe_x_mm", "probe_y_mm")
 DEPTH_COLUMN = "probe_depth_mm"  # only if a probe lies below the surface
-AMPLITUDE_COLUMNS = ("line", "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa")
-RESERVED = ("pictures", "propagation", "sensation")  # names of files and folders of pages
 DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[\d¹²³]", re.IGNORECASE)  # on Windows
-LONGEST_NAME, MOST_BYTES = 80, 200  # characters and bytes, so that an ending fits into 255 bytes
 
 
 def folder_name(name: str) -> str:
     """Return a scene's name as a folder or file name that is valid on all systems."""
-    plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:LONGEST_NAME]
-    plain = plain.encode()[:MOST_BYTES].decode(errors="ignore").strip()
-    is_reserved = plain.casefold() in ("", *RESERVED) or DEVICES.fullmatch(plain)
+    # Characters and bytes, so that an ending fits into 255 bytes.
+    longest_name, most_bytes = 80, 200
+    plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:longest_name]
+    plain = plain.encode()[:most_bytes].decode(errors="ignore").strip()
+    reserved = ("pictures", "propagation", "sensation")  # names of files and folders of pages
+    is_reserved = plain.casefold() in ("", *reserved) or DEVICES.fullmatch(plain)
     return f"scene_{plain}" if is_reserved else plain
 
 
@@ -89,7 +87,10 @@ def write_lines(path: Path, runs: Iterable[Run]) -> None:
     runs = list(runs)
     depth = [DEPTH_COLUMN] * any(not run.scene.reading.is_on_surface for run in runs)
     quantities = dict.fromkeys(run.response.record.column for run in runs)
-    columns = dict.fromkeys([*PLACE_COLUMNS, *depth, *AMPLITUDE_COLUMNS, *quantities])
+    # Columns of lines.csv; those of other quantities follow.
+    place_columns = ("tacton", "body", "model", "probe_x_mm", "probe_y_mm")
+    amplitude_columns = ("line", "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa")
+    columns = dict.fromkeys([*place_columns, *depth, *amplitude_columns, *quantities])
     rows = ([row.get(name) for name in columns] for run in runs for row in line_rows(run))
     path.write_bytes(Table(columns, rows).to_csv())
 

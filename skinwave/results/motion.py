@@ -47,8 +47,6 @@ from skinwave.system.effort import Clock, one_thread
 from skinwave.typing import Floats, Ints
 
 REDUCTION_TOLERANCE = 0.01  # stress at the surface then meets the load within 3 %
-MOST_VALUES = 500_000_000  # of the motion of a whole body, 4 GB
-INWARDS = np.array([[0.0, 0.0, -1.0]])  # the drawn component of normal motion
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -194,10 +192,11 @@ def probe_response(scene: Scene, moved: BodyMotion) -> Response:
 
 def check_values(frames: int, nodes: int) -> None:
     """Raise a ValueError if the motion does not fit into memory."""
-    if (values := 3 * frames * nodes) > MOST_VALUES:
+    most_values = 500_000_000  # of the motion of a whole body, 4 GB
+    if (values := 3 * frames * nodes) > most_values:
         raise ValueError(
             f"the motion has {values:,} values ({frames:,} times of {nodes:,} nodes); the limit is "
-            f"{MOST_VALUES:,}. Give fewer times or larger elements"
+            f"{most_values:,}. Give fewer times or larger elements"
         )
 
 
@@ -276,11 +275,12 @@ def shade(scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints) -> Shade:
     check_values(len(times), len(nodes))
     with_mean = quantity.invariant is not None and scene.body.is_held
     lines = moved.motion if with_mean else oscillating(moved.motion)
+    inwards = np.array([[0.0, 0.0, -1.0]])  # the drawn component of normal motion
     if quantity.field == STRAIN:
         check_coat(moved.build, Reading(quantity=quantity.name))
         values = _of_strain(quantity, lines, moved, times, nodes)
     else:
-        rows = {NORMAL: INWARDS, VECTOR: quantity.rows(scene.body.solid)}[quantity.field]
+        rows = {NORMAL: inwards, VECTOR: quantity.rows(scene.body.solid)}[quantity.field]
         basis = moved.own_basis.reshape(len(moved.mesh.points), 3, -1)[nodes]
         z = _coordinates(lines, times, None, quantity)
         values = z @ np.einsum("ci,nim->nm", rows, basis).T

@@ -17,9 +17,6 @@ from typing import IO
 from skinwave.results import record
 
 FILES = "files"  # key in record.json: path below its folder -> SHA-256
-REPORT = "report"  # folder that the command `report` makes within a result
-SYSTEM_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")  # written by file browsers
-LONGEST_PREFIX = 50  # characters of the target's name in a temporary name
 
 
 @contextmanager
@@ -90,7 +87,8 @@ def output_file(
 
 def temporary_path(out: Path, kind: str) -> Path:
     """Return an unused path in the folder of `out`."""
-    return out.with_name(f"{out.name[:LONGEST_PREFIX]}.{kind}-{secrets.token_hex(4)}")
+    longest_prefix = 50  # characters of the target's name in a temporary name
+    return out.with_name(f"{out.name[:longest_prefix]}.{kind}-{secrets.token_hex(4)}")
 
 
 def seal(folder: Path) -> None:
@@ -125,12 +123,14 @@ def foreign_file(folder: Path) -> Path | None:
     A report within the folder has a list of its own.
     """
     records, listed = set[Path](), dict[Path, str]()
-    for home in (folder, folder / REPORT):
+    report = "report"  # folder that the command `report` makes within a result
+    for home in (folder, folder / report):
         if (digests := listed_files(home)) is not None:
             records.add(home / record.FILE)
             listed |= {home / name: sha for name, sha in digests.items()}
+    system_files = (".DS_Store", "Thumbs.db", "desktop.ini")  # written by file browsers
     for path in sorted(folder.rglob("*")):
-        ours = path.name in SYSTEM_FILES or path in records or is_unchanged(path, listed.get(path))
+        ours = path.name in system_files or path in records or is_unchanged(path, listed.get(path))
         if not ours and (path.is_symlink() or not path.is_dir()):
             return path
     return None

@@ -27,9 +27,6 @@ from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
 OUTSIDE, NEAR = -20.0, -6.0  # dB re the largest RMS: the kernel's region, and the spread
-PRESENT, ABSENT = -40.0, -100.0  # dB re the strongest component of the same response
-SECTION = 24  # points of a line along a curved surface
-FACTOR_OF_TWO = 20 * np.log10(2.0)  # dB: the uncertainty of a device's pressure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,9 +152,10 @@ def distance_along(scene: Scene, surface: SurfaceField) -> Floats:
     height = RegularGridInterpolator(
         (surface.x, surface.y), np.nan_to_num(surface.height.T), bounds_error=False, fill_value=None
     )
-    shares = np.linspace(0, 1, SECTION)[:, None, None, None]
+    section = 24  # points of a line along a curved surface
+    shares = np.linspace(0, 1, section)[:, None, None, None]
     levels = height(surface.places + shares * (nearest - surface.places))
-    return np.asarray(np.hypot(flat / (SECTION - 1), np.diff(levels, axis=0)).sum(axis=0))
+    return np.asarray(np.hypot(flat / (section - 1), np.diff(levels, axis=0)).sum(axis=0))
 
 
 def reach_of(inside: np.ndarray, distance: Floats) -> Reach:
@@ -209,9 +207,10 @@ def strongest_component(run: Run, *, by_sensation: bool = False) -> Component | 
 def added_lines(kernel: Run, published: Run) -> list[str]:
     """Return the lines that drive law and focus add to the published load, the strongest first."""
     levels, published_levels = _levels(kernel), _levels(published)
+    present, absent = -40.0, -100.0  # dB re the strongest component of the same response
     added = (
         name for name, level in levels.items()
-        if level > PRESENT and published_levels.get(name, -np.inf) < ABSENT
+        if level > present and published_levels.get(name, -np.inf) < absent
     )  # fmt: skip
     return sorted(added, key=lambda name: -levels[name])
 
@@ -236,7 +235,8 @@ def _delay(run: Run, kernel: Run, frequency: float) -> float | None:
 def _above_threshold(surface: SurfaceField, distance: Floats) -> tuple[Reach | None, ...]:
     if surface.level is None:
         return ()
-    insides = [surface.level >= -more for more in (-FACTOR_OF_TWO, 0.0, FACTOR_OF_TWO)]
+    factor_of_two = 20 * np.log10(2.0)  # dB: the uncertainty of a device's pressure
+    insides = [surface.level >= -more for more in (-factor_of_two, 0.0, factor_of_two)]
     return tuple(reach_of(inside, distance) if inside.any() else None for inside in insides)
 
 

@@ -15,14 +15,16 @@ from skinwave.system.effort import threads, versions
 
 FILE = "record.json"
 RESPONSES = "responses.npz"
-# Options that do not affect the result.
-REPORTING = ("command", "command_name", "out", "overwrite", "quiet", "json", "debug", "no_cache",
-             "typed", "scheduler", "default_out", "summary")  # fmt: skip
 
 
 def command_entry(options: Namespace) -> dict[str, Any]:
     """Return a record of a command: as typed, its name and its options."""
-    given = {name: value for name, value in vars(options).items() if name not in REPORTING}
+    # Options that do not affect the result.
+    reporting = (
+        "command", "command_name", "out", "overwrite", "quiet", "json", "debug", "no_cache",
+        "typed", "scheduler", "default_out", "summary",
+    )  # fmt: skip
+    given = {name: value for name, value in vars(options).items() if name not in reporting}
     return {
         "typed": shlex.join(["skinwave", *options.typed]),
         "name": options.command_name,

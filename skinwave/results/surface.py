@@ -44,19 +44,8 @@ from skinwave.typing import Floats
 REACH, STEP = 0.044, 0.001  # m: half side of a map, and spacing of its places
 NEGLIGIBLE_LINE_RATIO = 1e-4  # to the load's strongest line: weaker lines do not show on a map
 LOWEST_LEVEL = -200.0  # dB, finite so that levels can be interpolated
-RADIAL_STEP = 0.5e-3  # m between the radii from which an axisymmetric map is interpolated
 MAP_TOLERANCE = 0.1  # relative error of the reduced-order model of a map
-# Element size of the second map over that of the first, and order of convergence, for Richardson
-# extrapolation.
-SECOND_SIZE, ORDER = 1.5, 2
-# Times at which an invariant is evaluated: their step in s is not a multiple of any period. A
-# smooth window over them gives the mean over all phases of several frequencies: Das, Saiki, Sander
-# and Yorke, Nonlinearity 30:4111 (2017).
-MANY_TIMES, TIME_STEP = 1024, 0.01 * (1 + 5**0.5) / 2
 LOWEST_FREQUENCY = 1e-9  # Hz: a line below it is the mean
-MOST_AT_ONCE = 2_000_000  # values in time that are held in memory
-MOST_PLACES = 40_000
-FLATNESS = 1e-6  # m: a surface whose heights differ by less is flat
 OPTIONAL = ("level", "height")  # arrays that some maps have
 
 Lines = tuple[Floats, fem.Complex]  # frequencies (f,) in Hz, complex amplitudes (f, p)
@@ -214,10 +203,11 @@ def quantity_map(
     """
     if not scene.body.of_kind.discretise:
         raise ValueError("a map needs a body, and the scene has none. Give one under [body]")
-    if not (0 < step <= reach and (2 * reach / step + 1) ** 2 <= MOST_PLACES):
+    most_places = 40_000
+    if not (0 < step <= reach and (2 * reach / step + 1) ** 2 <= most_places):
         raise ValueError(
             f"a map with reach {1e3 * reach:g} mm and step {1e3 * step:g} mm has no place, or more "
-            f"than {MOST_PLACES:,}. Choose another step"
+            f"than {most_places:,}. Choose another step"
         )
     x, y = grid(scene, reach, step)
     if has_wavenumber_integral(scene):
@@ -237,11 +227,14 @@ def quantity_map(
         )
     size = options.h or default_size(scene.body)
     solving = replace(options, tolerance=REDUCTION_TOLERANCE)
+    # Element size of the second map over that of the first, and order of convergence, for
+    # Richardson extrapolation.
+    second_size, order = 1.5, 2
     fine, coarse = (
         element_map(scene, reduced_motion(scene, replace(solving, h=h)), x, y)
-        for h in (size, SECOND_SIZE * size)
+        for h in (size, second_size * size)
     )
-    difference = np.nanmax(np.abs(coarse.rms - fine.rms)) / (SECOND_SIZE**ORDER - 1)
+    difference = np.nanmax(np.abs(coarse.rms - fine.rms)) / (second_size**order - 1)
     note = f"finite elements of {1e3 * size:.2g} mm"
     return replace(fine, note=note, error=float(difference / np.nanmax(fine.rms)))
 
@@ -267,7 +260,8 @@ def element_map(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> Surfac
 
     note = f"elements of {1e3 * moved.effort.h:.2g} mm"
     field = _field(scene, x, y, lines_of, note, on_body)
-    is_flat = not len(points) or np.ptp(points[:, 2]) <= FLATNESS
+    flatness = 1e-6  # m: a surface whose heights differ by less is flat
+    is_flat = not len(points) or np.ptp(points[:, 2]) <= flatness
     return field if is_flat else replace(field, height=height.reshape(field.rms.shape))
 
 
@@ -345,7 +339,8 @@ def _interpolate(pressure: MovingPressure, lines_at: LinesAt, x: Floats, y: Floa
     from scipy.interpolate import CubicSpline  # slow to import
 
     radius = np.hypot(*places.T)
-    radii = np.arange(0, radius.max() + 2 * RADIAL_STEP, RADIAL_STEP)
+    radial_step = 0.5e-3  # m between the radii from which an axisymmetric map is interpolated
+    radii = np.arange(0, radius.max() + 2 * radial_step, radial_step)
     frequencies, along = lines_at(np.column_stack([radii, 0 * radii]))
     return frequencies, CubicSpline(radii, np.abs(along), axis=1)(radius)
 
@@ -371,10 +366,15 @@ def _rms(quantity: Quantity, lines: Lines, places: int) -> Floats:
 
 def _invariant_rms(quantity: Quantity, f: Floats, a: fem.Complex) -> Iterator[Floats]:
     """Yield the RMS (q,) of an invariant of components (f, p, c), a few places at a time."""
-    times = TIME_STEP * np.arange(1.0, MANY_TIMES)
-    window = np.sin(np.pi * np.arange(1, MANY_TIMES) / MANY_TIMES) ** 4
+    # Times at which an invariant is evaluated: their step in s is not a multiple of any period. A
+    # smooth window over them gives the mean over all phases of several frequencies: Das, Saiki,
+    # Sander and Yorke, Nonlinearity 30:4111 (2017).
+    many_times, time_step = 1024, 0.01 * (1 + 5**0.5) / 2
+    times = time_step * np.arange(1.0, many_times)
+    window = np.sin(np.pi * np.arange(1, many_times) / many_times) ** 4
     window /= window.sum()
-    many = max(1, MOST_AT_ONCE // (len(times) * a.shape[2]))
+    most_at_once = 2_000_000  # values in time that are held in memory
+    many = max(1, most_at_once // (len(times) * a.shape[2]))
     for start in range(0, a.shape[1], many):
         part = a[:, start : start + many]
         values = quantity.waveforms(synthesise(f, part.reshape(len(f), -1), times), part.shape[1])

@@ -32,10 +32,8 @@ from skinwave.system.json_kinds import fitting
 from skinwave.typing import Array, Floats, Ints
 
 STRONG_LINE_RATIO = 0.1  # to the strongest line: weaker lines need no frames of their own
-KERNEL_GRID, LAYER_GRID = 121, 81  # points along a side of a flat surface
-TYPICAL_FREQUENCY = 140.0  # Hz, where nothing vibrates
+KERNEL_GRID = 121  # points along a side of a flat surface
 FIELD_FRAMES = 8  # frames that are exported to other programs
-PLATE_TOLERANCE = 0.05  # of the motion of a sheet at large deflection
 ARRAYS = ("points", "tets", "surface", "triangles", "times", "motion")
 META = {"body": str, "model": str, "quantity": str, "period": float, "tone": float, "scene": str}
 # Shapes of the arrays in a file: numbers, names of lengths, or None for any length.
@@ -43,11 +41,6 @@ SHAPES: dict[str, tuple[int | str | None, ...]] = {
     "points": ("n", 3), "times": ("f",), "motion": ("f", "n", 3), "surface": ("s",),
     "triangles": (None, 3), "tets": (None, 10), "tensor_frames": ("g",), "tensor_nodes": ("m",),
     "tensor_tets": (None, 10), "tensor_strain": ("g", "m", 6), "tensor_stress": ("g", "m", 6),
-}  # fmt: skip
-# Lengths that indices must be below.
-BOUNDS = {
-    "surface": "n", "triangles": "s", "tets": "n", "tensor_frames": "f", "tensor_nodes": "n",
-    "tensor_tets": "m",
 }  # fmt: skip
 
 Singles = NDArray[np.float32]
@@ -190,13 +183,15 @@ def flat_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
     `reach` and `part` are those of `kernel_view`.
     """
     scene, body = run.scene, run.scene.body
+    layer_grid = 81  # points along a side of a flat surface
     if scene.reading.is_plain and takes(FROM_REST, scene):
-        points, triangles = _grid(np.array([body.width, body.height]) / 2, LAYER_GRID)
+        points, triangles = _grid(np.array([body.width, body.height]) / 2, layer_grid)
         points[:, :2] += body.placement.offset
     else:
-        points, triangles = _grid(reach, LAYER_GRID)
+        points, triangles = _grid(reach, layer_grid)
     is_large = run.model == STRETCHED.name
-    lines_at = stretching_lines(scene, PLATE_TOLERANCE)[0] if is_large else surface_lines(scene)
+    plate_tolerance = 0.05  # of the motion of a sheet at large deflection
+    lines_at = stretching_lines(scene, plate_tolerance)[0] if is_large else surface_lines(scene)
     return _flat_view(scene, run.body, run.model, part, (points, triangles), lines_at)
 
 
@@ -204,7 +199,8 @@ def _speed(scene: Scene, tone: float) -> float | None:
     body = scene.body
     if not body.of_kind.discretise:
         return None
-    return body.of_kind.wave_speed(body, tone or TYPICAL_FREQUENCY)
+    typical_frequency = 140.0  # Hz, where nothing vibrates
+    return body.of_kind.wave_speed(body, tone or typical_frequency)
 
 
 def _strongest_tone(frequencies: Floats, amplitudes: Floats) -> float:
@@ -277,15 +273,20 @@ def _check_arrays(arrays: dict[str, Array]) -> None:
     lengths = {"n": "points", "s": "surface", "f": "times", "g": "tensor_frames",
                "m": "tensor_nodes"}  # fmt: skip
     sizes = {key: len(arrays[name]) for key, name in lengths.items() if name in arrays}
+    # Lengths that indices must be below.
+    bounds = {
+        "surface": "n", "triangles": "s", "tets": "n", "tensor_frames": "f", "tensor_nodes": "n",
+        "tensor_tets": "m",
+    }  # fmt: skip
     for name, array in arrays.items():
         shape = [sizes[each] if isinstance(each, str) else each for each in SHAPES[name]]
         fits = array.ndim == len(shape) and all(
             expected in (actual, None) for actual, expected in zip(array.shape, shape, strict=True)
         )
-        if not fits or array.dtype.kind not in ("iu" if name in BOUNDS else "fiu"):
+        if not fits or array.dtype.kind not in ("iu" if name in bounds else "fiu"):
             raise ValueError(f"'{name}' has shape {array.shape} and type {array.dtype}")
-        is_index = name in BOUNDS and array.size
-        if is_index and not 0 <= array.min() <= array.max() < sizes[BOUNDS[name]]:
+        is_index = name in bounds and array.size
+        if is_index and not 0 <= array.min() <= array.max() < sizes[bounds[name]]:
             raise ValueError(f"'{name}' has an index out of range")
         if not np.isfinite(array).all():
             raise ValueError(f"'{name}' has values that are not finite")

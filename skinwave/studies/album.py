@@ -62,7 +62,6 @@ from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.json_kinds import EFFORT, PLAN, effort_of, fitting
 from skinwave.typing import Floats
 
-LARGER = 1.5  # element size of pictures over the default one, at a fifth of the time
 PLANNED = 0.05  # tolerance of the plan on the page
 
 
@@ -202,7 +201,8 @@ def compute_views(
 
 def _pictured(scene: Scene, options: SolveOptions) -> BodyMotion:
     """Return the motion of a body for pictures."""
-    size = options.h or LARGER * default_size(scene.body)
+    larger = 1.5  # element size of pictures over the default one, at a fifth of the time
+    size = options.h or larger * default_size(scene.body)
     return whole_motion(
         scene, replace(options, tolerance=REDUCTION_TOLERANCE, h=size, progress=silent)
     )

@@ -49,11 +49,8 @@ ASSUMPTIONS = {
     "flat": "the palm is curved, and one layer has the mean stiffness of all layers",
     "small deflection": "the sheet stretches as it bends",
 }
-LARGER = 1.25  # element size over the default one, at a third of the time
 DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
 LITTLE_LOSS = 0.1  # of the loss of material and edges: an undamped resonance has no bound
-RELAXATION_TIME = PRESETS["palm-zener"].prony[0].time
-LEAST_LONG_TERM = 0.5  # share of the static modulus that does not relax
 LAYERS = (
     Layer(thickness=0.3e-3, material="epidermis"),
     Layer(thickness=1.0e-3, material="dermis"),
@@ -125,7 +122,8 @@ def can_be_alone(name: str, names: Collection[str], scene: Scene, h: float | Non
 
 def element_size(scene: Scene, h: float | None = None) -> float:
     """Return the element size in m of all steps with elements."""
-    return h or LARGER * default_size(scene.body)
+    larger = 1.25  # element size over the default one, at a third of the time
+    return h or larger * default_size(scene.body)
 
 
 def infinite(scene: Scene, body: Body, h: float | None = None) -> Body:
@@ -290,7 +288,9 @@ def as_relaxing(solid: Material, w: float) -> Material:
     if not loss or solid.fast_modulus:  # nothing to fit, or already relaxing
         return solid
     solid = solid.without_loss_factor()
-    time = min(RELAXATION_TIME, (1 - LEAST_LONG_TERM) * solid.shear_modulus / loss / w)
+    relaxation_time = PRESETS["palm-zener"].prony[0].time
+    least_long_term = 0.5  # share of the static modulus that does not relax
+    time = min(relaxation_time, (1 - least_long_term) * solid.shear_modulus / loss / w)
     turned = w * time
     term = PronyTerm(modulus=loss * (1 + turned**2) / turned, time=time)
     others = max(solid.viscosity - loss / w, 0.0)  # of the loss factor

@@ -31,12 +31,6 @@ from skinwave.system.table import Column, Table
 LOWEST, HIGHEST = 10.0, 650.0  # Hz
 FREQUENCIES = 48  # between these, in addition to those of the lines
 MODES = 6
-WEAKEST, MOST_LINES = 1e-2, 12  # ratio to the strongest line of the load; number of lines
-SAME_FREQUENCY = 0.2  # Hz: no other frequency is computed this close to a line
-MODE_COLUMNS = (
-    "mode", "kind", "frequency_hz", "re_k_rad_per_m", "im_k_rad_per_m", "phase_speed_m_per_s",
-    "group_speed_m_per_s", "decay_length_mm", "motion_beside_focus_um_per_pa",
-)  # fmt: skip
 LINE_COLUMNS = (
     "line", Column("frequency_hz", "frequency", "Hz", 4), Column("pressure_pa", "pressure", "Pa"),
     Column("mode", "driven mode"), "kind", Column("share", digits=2),
@@ -141,10 +135,12 @@ def driven_modes(
             f"the highest frequency of dispersion curves is {highest:g} Hz; it must be above "
             f"{2 * LOWEST:g} Hz. {HIGHEST:g} Hz covers what skin perceives"
         )
-    load = line_names(scene.pressure, WEAKEST, most=MOST_LINES)
+    weakest, most_lines = 1e-2, 12  # ratio to the strongest line of the load; number of lines
+    load = line_names(scene.pressure, weakest, most=most_lines)
     within = (load.frequencies > LOWEST) & (load.frequencies < highest)
     own, others = load.frequencies[within], np.linspace(LOWEST, highest, spacing)
-    near = np.abs(others[:, None] - own).min(axis=1, initial=np.inf) < SAME_FREQUENCY
+    same_frequency = 0.2  # Hz: no other frequency is computed this close to a line
+    near = np.abs(others[:, None] - own).min(axis=1, initial=np.inf) < same_frequency
     curves = dispersion(scene.body, np.unique(np.concatenate([own, others[~near]])), most)
     amplitudes, path = _amplitudes(curves.modes, scene.pressure), scene.tacton.trajectory
     lines = []
@@ -233,7 +229,11 @@ def page_parts(driven: DrivenModes, gallery: Gallery) -> list[Part]:
 
 def write(folder: Path, driven: DrivenModes) -> None:
     """Write index.html, dispersion.png, dispersion.csv, driven-lines.csv and dispersion.npz."""
-    (folder / "dispersion.csv").write_bytes(Table(MODE_COLUMNS, _mode_rows(driven)).to_csv())
+    mode_columns = (
+        "mode", "kind", "frequency_hz", "re_k_rad_per_m", "im_k_rad_per_m", "phase_speed_m_per_s",
+        "group_speed_m_per_s", "decay_length_mm", "motion_beside_focus_um_per_pa",
+    )  # fmt: skip
+    (folder / "dispersion.csv").write_bytes(Table(mode_columns, _mode_rows(driven)).to_csv())
     modes = driven.curves.modes
     np.savez(
         folder / "dispersion.npz", frequency_hz=driven.curves.frequencies,

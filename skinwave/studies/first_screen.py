@@ -32,8 +32,6 @@ from skinwave.scene.variation import with_values
 if TYPE_CHECKING:
     from skinwave.report.maps import MeasuredPlaces
 
-MATERIAL, ENDS = "material", (0.05, 0.95)  # part of an uncertainty; ends of its 90 % interval
-PREFERRED = "am140-stm20"  # the paper's Tacton with both modulations in the middle
 Maps = tuple[SurfaceField, SurfaceField] | tuple[()]  # of a body and of the kernel
 
 
@@ -152,7 +150,8 @@ def beside_kernel(scene: Scene, surface: SurfaceField) -> tuple[SurfaceField, Su
 def first_name(names: Iterable[str]) -> str:
     """Return the name of the Tacton on the first screen."""
     names = list(names)
-    return PREFERRED if PREFERRED in names else (names or [""])[0]
+    preferred = "am140-stm20"  # the paper's Tacton with both modulations in the middle
+    return preferred if preferred in names else (names or [""])[0]
 
 
 @lru_cache(maxsize=16)  # several parts of a page show the same scenes
@@ -168,11 +167,12 @@ def _shares(scene: Scene) -> tuple[float, float] | None:
     """Return the smallest and largest share outside the kernel's region over the range of moduli
     and losses of all materials, or None if none is uncertain.
     """
-    spreads = [each for each in spreads_of(scene) if each.part == MATERIAL]
+    material, ends = "material", (0.05, 0.95)  # part of an uncertainty; ends of its 90 % interval
+    spreads = [each for each in spreads_of(scene) if each.part == material]
     if not spreads or not has_wavenumber_integral(scene):
         return None
     scenes = [scene]
-    for scale, end in product(SCALES, ENDS):
+    for scale, end in product(SCALES, ends):
         values = {
             each.key: float(each.distribution.quantile(each.value, end))
             for each in spreads

@@ -10,14 +10,6 @@ from skinwave.results.propagation import Reach
 from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Floats
 
-FARTHEST, STEP = 40e-3, 0.5e-3  # m: longest line, and resolution of its end on a body
-# Distances of probes before the end, in units of the smaller of 5 mm and a quarter of the line.
-UNIT, PLACED = 5e-3, np.array([0, 1, 2, 3, 4, 6])
-INNER = 0.9  # of the way to the edge of the body, where its surface slopes
-SAME = 1e-6  # m
-LOWEST = -100.0  # dB, of what does not vibrate
-AXES = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outward:
@@ -31,7 +23,8 @@ class Outward:
 
     def reach(self, levels: Floats) -> Reach | None:
         """Return how far levels (k,) in dB at the probes are above 0; None if not at the path."""
-        level = np.maximum(levels, LOWEST)
+        lowest = -100.0  # dB, of what does not vibrate
+        level = np.maximum(levels, lowest)
         below = np.flatnonzero(level <= 0)
         if not len(below):
             return Reach(metre=float(self.distances[-1]), beyond=True)
@@ -50,18 +43,24 @@ def outward(scene: Scene, body: Body, h: float) -> Outward | None:
     the path.
     """
     path, probes = scene.tacton.trajectory.outline, scene.probe_points
-    beyond = {name: (probes @ axis).max() - (path @ axis).max() for name, axis in AXES.items()}
-    towards = max(AXES, key=lambda name: round(beyond[name], 9))
-    axis = np.array(AXES[towards])
-    outermost = path[path @ axis > (path @ axis).max() - SAME]
+    axes = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
+    beyond = {name: (probes @ axis).max() - (path @ axis).max() for name, axis in axes.items()}
+    towards = max(axes, key=lambda name: round(beyond[name], 9))
+    axis = np.array(axes[towards])
+    same = 1e-6  # m
+    outermost = path[path @ axis > (path @ axis).max() - same]
     start = outermost[np.argmin(np.linalg.norm(outermost, axis=1))]
-    steps = np.arange(round(FARTHEST / STEP) + 1) * STEP
+    farthest, step = 40e-3, 0.5e-3  # m: longest line, and resolution of its end on a body
+    steps = np.arange(round(farthest / step) + 1) * step
     off = np.flatnonzero(~_on_body(body, start + steps[:, None] * axis, h))
     steps = steps[: off[0]] if len(off) else steps
-    if len(steps) <= len(PLACED):
+    # Distances of probes before the end, in units of the smaller of 5 mm and a quarter of the line.
+    unit, placed = 5e-3, np.array([0, 1, 2, 3, 4, 6])
+    if len(steps) <= len(placed):
         return None
-    end = INNER * steps[-1] if len(off) else FARTHEST
-    distances = min(UNIT, end / 4) * PLACED
+    inner = 0.9  # of the way to the edge of the body, where its surface slopes
+    end = inner * steps[-1] if len(off) else farthest
+    distances = min(unit, end / 4) * placed
     distances = np.append(distances[distances < 0.9 * end], end)
     return Outward(probes=start + distances[:, None] * axis, towards=towards, distances=distances)
 

@@ -69,16 +69,8 @@ from skinwave.system.failures import or_failed
 from skinwave.system.table import Table
 
 MARKS = "Black: path and focus; yellow: probes."
-COMPARED = (
-    "Colour: motion into the body (mean removed) or pressure of the kernel, relative to the "
-    "largest value of each model. All models receive the same load."
-)
 T = TypeVar("T")
-PICTURES = "pictures"  # folder of a page's figures
 AT_REST, SIDE_BY_SIDE = "at-rest", "side-by-side"  # names of pictures
-QUALITY = 88  # of pictures inside a page
-NAMED = 3  # lines that a sentence names
-NO_MOTION = "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
 ABOUT_MAPS = (
     "Shares and spreads come from maps that reach 44 mm from the origin along x and y; areas and "
     "distances on a curved body are those along its surface. The map of a slab is that of a "
@@ -86,19 +78,9 @@ ABOUT_MAPS = (
     "delay, that of the kernel's strongest component, is known up to whole periods, and includes "
     "the phase lag of the body; below 0 the body is ahead."
 )
-BODY_CAPTION = (
-    "at rest, with its mesh and its boundary conditions. Where a support begins smoothly, its "
-    "colour fades in. The plate below shows the condition of the base. A body of several materials "
-    "is cut open."
-)
-WAVEFORMS = "Waveforms and spectra; each row is a probe."
 LOADS = (
     "The published kernel has its published load: a linear drive and a sinc² main lobe. All "
     "other models have the load of the scene."
-)
-SENSATION = (
-    "Lines of the motion at the probe that moves most. The detection threshold for a focal spot on "
-    "the hand (Verrillo 1963; Bolanowski et al. 1988) is uncertain by 5 dB or more."
 )
 
 
@@ -132,7 +114,8 @@ class Gallery:
 def _compress(image: Pillow.Image) -> tuple[bytes, str]:
     """Return a small file of a picture, and its format."""
     buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
-    image.save(buffer, format=kind, quality=QUALITY, method=4)
+    quality = 88  # of pictures inside a page
+    image.save(buffer, format=kind, quality=quality, method=4)
     return buffer.getvalue(), kind
 
 
@@ -206,7 +189,8 @@ def page_of(
             detail = Section(f"One of them: {first.kernel.tacton}", own)
             parts = [overview.table(effects), numbers, parts[0], *spatial, detail, *parts[1:]]
     verdict = [" ".join(verdict)] if verdict else []
-    return Report(title, verdict, parts, efforts_of(runs), PICTURES, failures)
+    pictures = "pictures"  # folder of a page's figures
+    return Report(title, verdict, parts, efforts_of(runs), pictures, failures)
 
 
 def _begin_pictures(runs: Sequence[Run], gallery: Gallery) -> "dict[Run, Callable[[], Any]]":
@@ -260,12 +244,17 @@ def _body_parts(
     if at_rest and not renderer().is_available:
         return [Section("The body", [f"Its picture is left out: {renderer().detail}."])]
     parts: list[Part] = []
+    body_caption = (
+        "at rest, with its mesh and its boundary conditions. Where a support begins smoothly, its "
+        "colour fades in. The plate below shows the condition of the base. A body of several "
+        "materials is cut open."
+    )
     for run, drawn in at_rest.items():
         from skinwave.report.body_picture import drawn_size  # slow to import
 
         with or_failed(failures, f"picture of {run.column} at rest"):
             size = significant(1e3 * drawn_size(run.scene.body), 2)
-            caption = f"{label(run.column)} {BODY_CAPTION} Elements in this picture: {size} mm."
+            caption = f"{label(run.column)} {body_caption} Elements in this picture: {size} mm."
             name = "body" if len(at_rest) == 1 else f"body-{run.column}"
             parts.append(gallery.image(name, drawn(), caption))
     return [Section("The body", parts)] if parts else []
@@ -349,9 +338,13 @@ def _tacton_pictures(
     runs, title = list(group), "waveforms and spectra" if is_single else name
     figure = tacton_figure(name, runs, gallery.style)
     pictures = {title: gallery.figure(file, figure, _caption(name, runs))}
+    sensation = (
+        "Lines of the motion at the probe that moves most. The detection threshold for a focal "
+        "spot on the hand (Verrillo 1963; Bolanowski et al. 1988) is uncertain by 5 dB or more."
+    )
     if is_single and any(run.response.record.of_body for run in runs):
         figure = levels_figure(runs, strongest_probe(runs), gallery.style)
-        pictures["sensation levels"] = gallery.figure("sensation", figure, SENSATION)
+        pictures["sensation levels"] = gallery.figure("sensation", figure, sensation)
     return pictures
 
 
@@ -368,7 +361,8 @@ def _caption(name: str, runs: Sequence[Run]) -> str:
     tacton, columns = runs[0].scene.tacton, {run.column for run in runs}
     path = [] if tacton.trajectory.is_static else [description.path_text(tacton)]
     commanded = [*description.tone_texts(tacton), *path, *description.level_texts(tacton)]
-    text = f"{name}: {', '.join(commanded) or 'constant pressure'}. {WAVEFORMS}"
+    waveforms = "Waveforms and spectra; each row is a probe."
+    text = f"{name}: {', '.join(commanded) or 'constant pressure'}. {waveforms}"
     return f"{text} {LOADS}" if {PUBLISHED.name, SAME_LOAD.name} <= columns else text
 
 
@@ -406,7 +400,11 @@ def side_by_side(views: Sequence[View], frame: int, gallery: Gallery, drawn: Any
     """Return a picture of views in three dimensions at one frame, or of its `drawn` pixels."""
     scales = (f"{label(view.column)}: {render.scale_text(view)}" for view in views)
     peaks = (f"{label(view.column)} {view.quantity.text(view.peak)}" for view in views)
-    caption = f"{'; '.join(scales)}. Largest values: {', '.join(peaks)}. {MARKS} {COMPARED}"
+    compared = (
+        "Colour: motion into the body (mean removed) or pressure of the kernel, relative to the "
+        "largest value of each model. All models receive the same load."
+    )
+    caption = f"{'; '.join(scales)}. Largest values: {', '.join(peaks)}. {MARKS} {compared}"
     pixels = render.picture(views, gallery.style, frame) if drawn is None else drawn
     return gallery.image(SIDE_BY_SIDE, pixels, caption)
 
@@ -481,8 +479,9 @@ def _deflection_text(run: Run) -> str:
 
 def _propagation_sentence(first: FirstScreen) -> str:
     effect = first.own[first.body.column]
+    no_motion = "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
     if effect.strongest is None:
-        return NO_MOTION
+        return no_motion
     name, line = label(effect.column), effect.strongest
     if effect.share is None:
         return f"The {name} moves most at {line.frequency:.0f} Hz ({line.name})."
@@ -509,7 +508,8 @@ def _drive_sentence(first: FirstScreen) -> str:
 
 
 def _first_names(names: Sequence[str]) -> str:
-    return ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
+    named = 3  # lines that a sentence names
+    return ", ".join(names[:named]) + " and others" * (len(names) > named)
 
 
 def _uncertainty(first: FirstScreen) -> str:

@@ -32,10 +32,7 @@ from skinwave.typing import Floats
 DURATION = 0.5  # s, of each Tacton; its later half is evaluated
 AMPLITUDES = (0.25, 0.5, 1.0)
 AM = 140.0  # Hz, of the Tacton whose amplitude is varied
-NEGLIGIBLE_CHANGE = 1e-3  # relative, of a ratio over the amplitudes
 NEGLIGIBLE_RATIO = 1e-5  # of 2 f_AM to f_AM
-WEAKEST = -100.0  # dB re the strongest line of a run: weaker lines are round-off
-HIGHEST = 700.0  # Hz
 # Loads over one period of the modulation m = sin, relative to the largest. Each has its own ratios
 # 2f/f, 3f/f and 4f/f, before the response of the body changes them.
 LOADS: Mapping[str, Callable[[Floats], Floats]] = {
@@ -133,7 +130,8 @@ def _levels(pressure: MovingPressure, later: Response) -> dict[str, float]:
 
     They include the lines of claims, because a stretching sheet has lines that its load does not.
     """
-    names, _ = resolved_lines(pressure, later, candidates=ASSESSED, highest=HIGHEST)
+    highest = 700.0  # Hz
+    names, _ = resolved_lines(pressure, later, candidates=ASSESSED, highest=highest)
     amplitudes = lines(later, list(names.values())).max(axis=1)
     with np.errstate(divide="ignore"):
         levels = 20 * np.log10(amplitudes / amplitudes.max(initial=np.finfo(float).tiny))
@@ -155,10 +153,11 @@ def load_ratios() -> dict[str, tuple[float, ...]]:
 def sentences(findings: Findings) -> list[str]:
     """Return conclusions: explained lines, unexplained lines, and the deciding experiment."""
     parts, low = [], f"{100 * AMPLITUDES[0]:.0f}"
+    negligible_change = 1e-3  # relative, of a ratio over the amplitudes
     for mechanism, ratios in findings.ratios.items():
         if max(ratios) < NEGLIGIBLE_RATIO:
             parts.append(f"{mechanism}: no 2 f_AM at any amplitude.")
-        elif max(ratios) < (1 + NEGLIGIBLE_CHANGE) * min(ratios):
+        elif max(ratios) < (1 + negligible_change) * min(ratios):
             parts.append(
                 f"{mechanism}: 2 f_AM is {ratios[-1]:.3f} of f_AM at {low} to 100 % of the "
                 "amplitude. It is a line of the load."
@@ -213,7 +212,8 @@ def report(findings: Findings) -> Report:
 
 def _strong_level(levels: Mapping[str, float], mechanism: str) -> float | None:
     level = levels.get(mechanism, -np.inf)
-    return level if level > WEAKEST else None
+    weakest = -100.0  # dB re the strongest line of a run: weaker lines are round-off
+    return level if level > weakest else None
 
 
 def ratio_figure(findings: Findings) -> Figure:

@@ -54,38 +54,13 @@ from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
 HIGHEST = 600.0  # Hz, of the lines that are compared
-WEAKEST_RATIO = 0.01  # to the strongest line at a probe
-TINY = np.finfo(float).tiny
 FIRST = "as published"  # step of the model point-kernel-published
-LINE_COLUMNS = (
-    "step", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_step_before_db",
-    "from_richest_db",
-)  # fmt: skip
-EFFECT_COLUMNS = (
-    "assumption", "waveform_percent", "at_mm", "level_db", "reach_with_mm", "reach_without_mm",
-    "alone_percent", "costs_s", "lines_db",
-)  # fmt: skip
-STEP_COLUMNS = (
-    "step", "model", Column("dofs", "degrees of freedom"),
-    Column("seconds", "time", "s", digits=2), Column("memory_gib", "memory", "GiB", digits=2),
-    Column("error", "reason of failure"),
-)  # fmt: skip
-INTRODUCTION = (
-    "The steps lead from the published model to the richest one of this scene, one assumption "
-    "after another. A pressure and a displacement are compared after the best-fitting factor."
-)
-BARS = (
-    "What changes if each assumption is dropped: the waveform, relative to the motion of the "
-    "strongest probe; and, on skin, the highest sensation level at a probe, and the distance from "
-    "the path up to which a line exceeds the detection threshold."
-)
 PAGE_COLUMNS = (
     "dropped assumption", Column("change of the waveform", digits=2), "at, mm",
     Column("change of the sensation level", unit="dB", digits=2), "reach above threshold, mm",
     Column("change if no other assumption is made", digits=2), "largest change of a line",
     Column("extra time", unit="s", digits=2),
 )  # fmt: skip
-OUT_OF_NOTHING = 60.0  # dB: a line that changes by more appears or vanishes
 NEGLIGIBLE_TIME = 0.05  # s
 
 
@@ -347,7 +322,8 @@ def _changes(reference: Response, candidate: Response) -> tuple[Floats, float]:
     """Return changes (p,) relative to the strongest probe, and the factor of the candidate."""
     agreement = compare(reference, candidate)
     sizes = np.linalg.norm(reference.values, axis=0)
-    return np.asarray(agreement.relative_l2 * sizes / max(sizes.max(), TINY)), agreement.scale
+    tiny = np.finfo(float).tiny
+    return np.asarray(agreement.relative_l2 * sizes / max(sizes.max(), tiny)), agreement.scale
 
 
 def levels_at_probes(scene: Scene, response: Response) -> Floats:
@@ -381,7 +357,8 @@ def line_changes(
         return {}
     old, new = (lines(r, list(names.values())) for r in (before, after))
     old = abs(scale) * old
-    least = WEAKEST_RATIO * max(old.max(), new.max())
+    weakest_ratio = 0.01  # to the strongest line at a probe
+    least = weakest_ratio * max(old.max(), new.max())
     changes = {}
     for k, name in enumerate(names):
         probe = int(np.argmax(np.maximum(old[k], new[k])))
@@ -430,7 +407,8 @@ def _line_change(changes: dict[str, float]) -> str | None:
     if not changes:
         return None
     line = max(changes, key=lambda name: abs(changes[name]))
-    if abs(changes[line]) > OUT_OF_NOTHING:
+    out_of_nothing = 60.0  # dB: a line that changes by more appears or vanishes
+    if abs(changes[line]) > out_of_nothing:
         return f"{line} {'appears' if changes[line] > 0 else 'vanishes'}"
     return f"{line} {decibel(changes[line], signed=True)} dB"
 
@@ -438,7 +416,11 @@ def _line_change(changes: dict[str, float]) -> str | None:
 def write(folder: Path, hierarchy: Hierarchy) -> None:
     """Write index.html, relax.png, relax.csv, effects.csv, steps.csv and responses.npz."""
     effects = hierarchy.effects()
-    (folder / "relax.csv").write_bytes(Table(LINE_COLUMNS, _line_rows(hierarchy)).to_csv())
+    line_columns = (
+        "step", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_step_before_db",
+        "from_richest_db",
+    )  # fmt: skip
+    (folder / "relax.csv").write_bytes(Table(line_columns, _line_rows(hierarchy)).to_csv())
     responses = {step.name: step.response for step in hierarchy.every if step.response}
     arrays = {name: response.values for name, response in responses.items()}
     first = next(iter(responses.values()))
@@ -451,13 +433,31 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
         verdict += (
             f"'{effects[0].name}' has the largest effect: without it, {_change_text(effects[0])}"
         )
-    (folder / "effects.csv").write_bytes(Table(EFFECT_COLUMNS, map(_effect_row, effects)).to_csv())
-    steps = Table(STEP_COLUMNS, map(_step_row, hierarchy.every), "steps")
+    effect_columns = (
+        "assumption", "waveform_percent", "at_mm", "level_db", "reach_with_mm", "reach_without_mm",
+        "alone_percent", "costs_s", "lines_db",
+    )  # fmt: skip
+    (folder / "effects.csv").write_bytes(Table(effect_columns, map(_effect_row, effects)).to_csv())
+    step_columns = (
+        "step", "model", Column("dofs", "degrees of freedom"),
+        Column("seconds", "time", "s", digits=2), Column("memory_gib", "memory", "GiB", digits=2),
+        Column("error", "reason of failure"),
+    )  # fmt: skip
+    steps = Table(step_columns, map(_step_row, hierarchy.every), "steps")
+    introduction = (
+        "The steps lead from the published model to the richest one of this scene, one assumption "
+        "after another. A pressure and a displacement are compared after the best-fitting factor."
+    )
+    bars = (
+        "What changes if each assumption is dropped: the waveform, relative to the motion of the "
+        "strongest probe; and, on skin, the highest sensation level at a probe, and the distance "
+        "from the path up to which a line exceeds the detection threshold."
+    )
     parts: list[Part] = [
-        Picture(png(_figure(effects, hierarchy.towards), dpi=130), BARS, "relax"),
+        Picture(png(_figure(effects, hierarchy.towards), dpi=130), bars, "relax"),
         Table(PAGE_COLUMNS, map(_page_row, effects)),
         Details("Steps and their warnings", [
-            INTRODUCTION, steps, warnings_banner(hierarchy.efforts),
+            introduction, steps, warnings_banner(hierarchy.efforts),
         ]),
     ]  # fmt: skip
     richest = [effort for effort in hierarchy.efforts if effort[0] == hierarchy.steps[-1].name]

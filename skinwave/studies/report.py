@@ -43,12 +43,6 @@ from skinwave.system.failures import or_failed
 from skinwave.system.processes import pool
 from skinwave.system.table import Table
 
-FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
-FILM_QUALITY = 60
-NO_VIEWS = (
-    "These results contain no motion of whole bodies, so that there is no picture of a surface. "
-    "skinwave report SCENE computes it."
-)
 TURNED = (
     "Turn it with the mouse, a finger or the arrow keys. Colour: motion about its mean, red into "
     "the body, blue out of it. If the legend has ≥, larger values have the end colour. Black: path "
@@ -113,8 +107,12 @@ def picture_parts(
 ) -> list[Part]:
     """Return parts of a page that show the views, or say why there are none."""
     views = list(album.views.values())
+    no_views = (
+        "These results contain no motion of whole bodies, so that there is no picture of a "
+        "surface. skinwave report SCENE computes it."
+    )
     if not views:
-        return [NO_VIEWS]
+        return [no_views]
     of_scene = [v for v in views if v.scene.body == album.scene.body and v.quantity.of_body]
     own = (of_scene or views)[-1]
     frame = own.peak_frame
@@ -177,15 +175,17 @@ def _film(own: View, views: Sequence[View], style: Style, progress: Progress) ->
     count = len(own.times)
     slower = significant(duration(count) / own.period, 2)
     caption = f"Film: {played_text(own)}. {count} frames, slowed down {slower} times."
+    film_panel = (352, 304)  # pixels of a model in the film of a page
     with TemporaryDirectory() as folder:
         path = Path(folder, "film.gif")
-        film(path, views, style, progress, panel=FILM_PANEL)
+        film(path, views, style, progress, panel=film_panel)
         gif = path.read_bytes()
     if not features.check("webp"):
         return Picture(gif, caption, "film", "gif")
     buffer = io.BytesIO()
+    film_quality = 60
     with Pillow.open(io.BytesIO(gif)) as frames:
-        frames.save(buffer, format="webp", save_all=True, quality=FILM_QUALITY, method=2, loop=0)
+        frames.save(buffer, format="webp", save_all=True, quality=film_quality, method=2, loop=0)
     return Picture(buffer.getvalue(), caption, "film", "webp", {"gif": gif})
 
 

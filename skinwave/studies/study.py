@@ -54,11 +54,6 @@ COMPLETENESS = (
     "flat-body-harmonic", "flat-body", "plate-modes-transient", "fem", "plate-modes-nonlinear",
 )  # fmt: skip
 LIVE = "live.html"
-ABOUT = (
-    "The point-kernel model of Lim, Seifi and Park (CHI EA '24, doi 10.1145/3613905.3650981) is "
-    "run as published and under the load of the bodies. Amplitudes of all lines are in lines.csv, "
-    "waveforms in responses.npz; the folder of each run has its scene."
-)
 Scenes = Mapping[str, Mapping[str, Scene]]  # Tacton -> column -> scene
 
 
@@ -122,6 +117,11 @@ def run_study(
     found, interrupted = Found(), True
     failed = found.failures
     options = replace(options, model="auto", progress=silent)
+    about = (
+        "The point-kernel model of Lim, Seifi and Park (CHI EA '24, doi 10.1145/3613905.3650981) "
+        "is run as published and under the load of the bodies. Amplitudes of all lines are in "
+        "lines.csv, waveforms in responses.npz; the folder of each run has its scene."
+    )
     with one_thread(), pool(2) as workers:
         live_page = workers.submit(html_file.comparison_page, live)
         with suppress(KeyboardInterrupt):
@@ -177,7 +177,7 @@ def run_study(
         gallery = Gallery(workers=None if interrupted else workers)
         page_of(
             title, groups, first, gallery, figures=figures, progress=progress,
-            before=parts, modelled=[ABOUT], seconds=time.perf_counter() - started,
+            before=parts, modelled=[about], seconds=time.perf_counter() - started,
             command=command, failures=failed,
             notes=["For one run: skinwave run TACTON/BODY/scene.toml in this folder."],
         ).write(folder)  # fmt: skip

@@ -18,26 +18,8 @@ from skinwave.system.document import Details, Markup, Part, Section
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
-STILL_RATIO = 0.01  # to the strongest probe: a misfit is given where the reference moves more
-ROUND_OFF = 1e-3  # ms, or of a misfit
 MOST_LINES = 12  # in a table
-NEGLIGIBLE_LINE_RATIO = 1e-9  # to the strongest line
-LEVELS = (
-    "Levels are relative to f_AM at the same probe, where it may be weak: the highest over the "
-    "probes, the lowest over the Tactons."
-)
-AGREEMENT = (
-    "Tacton", "what changes", "models", "waveform misfit at the best scale",
-    "misfit at the best gain and delay", "delay at the probes, ms",
-    "phase delay of the strongest component, ms", "spread over the probes at -6 / -20 dB, mm",
-)  # fmt: skip
-CHECKED = (
-    "The flat slab has the layers of the body under the focus and no sides. It is computed by the "
-    "wavenumber integral, independently of the elements; both agree on a slab (docs/accuracy.md). "
-    "What differs is due to the curved surface, the sides and the support of the body."
-)
 ERRORS = "body", "expected error of the waveform at the worst probe", "cure of the largest part"
-ERROR_RULE = "The squares of the parts add, because their causes are independent."
 EFFORT = (
     "body", "degrees of freedom", "reduced to", Column("estimated reduction error", digits=2),
     Column("relative energy imbalance", digits=1), "radiated share of loss", "solver",
@@ -77,7 +59,8 @@ def _share(run: Run, name: str, probe: int) -> float:
 
 def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> list[str]:
     """Return a line's amplitude, 0 if round-off, and for skin its level above threshold."""
-    if _share(run, name, probe) < NEGLIGIBLE_LINE_RATIO:
+    negligible_line_ratio = 1e-9  # to the strongest line
+    if _share(run, name, probe) < negligible_line_ratio:
         return ["0", ""] if run.is_skin else ["0"]
     size = significant(run.response.record.per_unit * float(run.table.amplitudes[name][probe]))
     if not run.is_skin:
@@ -118,7 +101,11 @@ def claims_parts(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
         marks.append([f"{claim}: {TEXTS[claim]}", *map(_mark, own)])
         numbers.append([claim, *(v.sentence if v else None for v in own)])
     names = list(map(label, columns))
-    decide = [LEVELS, Table(["claim", *names], numbers), *_disagreements(assessed_claims)]
+    levels = (
+        "Levels are relative to f_AM at the same probe, where it may be weak: the highest over the "
+        "probes, the lowest over the Tactons."
+    )
+    decide = [levels, Table(["claim", *names], numbers), *_disagreements(assessed_claims)]
     return [
         Section("Claims of the paper", [
             Table(["claim (Lim, Seifi and Park, CHI EA '24)", *names], marks),
@@ -164,7 +151,18 @@ def agreement_parts(runs: Mapping[str, Sequence[Run]], checks: Mapping[str, Run]
         for name, group in runs.items()
         for changed, a, b in _pairs(group, checks)
     ]
-    return [Table(AGREEMENT, rows), *[CHECKED] * bool(checks)]
+    agreement = (
+        "Tacton", "what changes", "models", "waveform misfit at the best scale",
+        "misfit at the best gain and delay", "delay at the probes, ms",
+        "phase delay of the strongest component, ms", "spread over the probes at -6 / -20 dB, mm",
+    )  # fmt: skip
+    checked = (
+        "The flat slab has the layers of the body under the focus and no sides. It is computed by "
+        "the wavenumber integral, independently of the elements; both agree on a slab "
+        "(docs/accuracy.md). What differs is due to the curved surface, the sides and the support "
+        "of the body."
+    )
+    return [Table(agreement, rows), *[checked] * bool(checks)]
 
 
 def _pairs(group: Iterable[Run], checks: Mapping[str, Run]) -> list[tuple[str, Run, Run]]:
@@ -187,7 +185,8 @@ def _agreement(a: Run, b: Run) -> list[str]:
     agreement = compare(a.response, b.response, (strongest.frequency,) if strongest else ())
     delays = agreement.phase_delay[0] if strongest else np.array([np.nan])
     level = moving_rms(a.response)
-    moves = level > STILL_RATIO * level.max()
+    still_ratio = 0.01  # to the strongest probe: a misfit is given where the reference moves more
+    moves = level > still_ratio * level.max()
     spreads = (agreement.spread_reference, agreement.spread_candidate)
     return [
         _range(agreement.relative_l2[moves]),
@@ -202,7 +201,8 @@ def _range(values: Floats) -> str:
     """Return the range of values."""
     if not len(values):
         return "-"
-    values = np.where(np.abs(values) < ROUND_OFF, 0.0, values) + 0.0
+    round_off = 1e-3  # ms, or of a misfit
+    values = np.where(np.abs(values) < round_off, 0.0, values) + 0.0
     low, high = float(values.min()), float(values.max())
     is_one = significant(low, 2) == significant(high, 2)
     return significant(low, 2) if is_one else interval(low, high)
@@ -232,5 +232,6 @@ def effort_table(
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
     text = f"{plural(tactons, 'Tacton')}: {significant(spent, 2)} s"
     text += f", at most {peak:.2f} GiB in one process" * bool(peak)
-    parts: list[Part] = [Table(ERRORS, errors), ERROR_RULE] if errors else []
+    error_rule = "The squares of the parts add, because their causes are independent."
+    parts: list[Part] = [Table(ERRORS, errors), error_rule] if errors else []
     return [*parts, Table(EFFORT, rows), f"{text}. {named}"]

@@ -35,16 +35,8 @@ from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.processes import pool
 from skinwave.system.table import Column, Table
 
-REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
 FINEST = (0.6, 0.5)  # element sizes of the two finest runs, whose difference tests convergence
-TOLERANCES, FINEST_TOLERANCES = (0.3, 0.05, 0.02), (0.01, 0.003)  # for stretching plates
 BARS = (0.01, 0.05, 0.20)  # errors for which the cheapest candidate is named
-PLANNED = 0.05  # tolerance of a candidate without one
-CAPTION = (
-    "Error of the worst probe's waveform against the reference, over the time of a first response "
-    "(cold) and of another one on the same body (warm). The area of a marker is the peak memory. A "
-    "black edge marks the Pareto front: no other candidate is as accurate and as fast both times."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,12 +106,14 @@ class Study:
 def candidates(scene: Scene) -> list[Candidate]:
     """Return every model that can compute the scene, over its discretisation parameters."""
     h = default_size(scene.body)
-    sizes = [round(h * factor, 6) for factor in REFINEMENTS]
+    refinements = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
+    sizes = [round(h * factor, 6) for factor in refinements]
     every = [Candidate(model="point-kernel")]
     every += [Candidate(model=each.name) for each in (HARMONIC, FLAT_BODY) if takes(each, scene)]
+    tolerances = (0.3, 0.05, 0.02)  # for stretching plates
     if takes(STRETCHED, scene):
         every += [Candidate(model=each.name) for each in (PLATES, FROM_REST)]
-        every += [Candidate(model=STRETCHED.name, tolerance=t) for t in TOLERANCES]
+        every += [Candidate(model=STRETCHED.name, tolerance=t) for t in tolerances]
         return every + [Candidate(model="fem", h=size) for size in sizes[:2] if takes(FEM, scene)]
     every += [Candidate(model="fem", h=size) for size in sizes]
     every += [Candidate(model="fem", h=sizes[2], tolerance=t) for t in (0.3, 0.03)]
@@ -140,8 +134,9 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
         raise ValueError("a scene without a body has one model only. Give it a sheet or a slab")
     tested = list(chosen or candidates(scene))
     fine = [Candidate(model="fem", h=round(default_size(scene.body) * f, 6)) for f in FINEST]
+    finest_tolerances = (0.01, 0.003)  # for stretching plates
     if stretches(scene, min(BARS)):
-        fine = [Candidate(model=STRETCHED.name, tolerance=t) for t in FINEST_TOLERANCES]
+        fine = [Candidate(model=STRETCHED.name, tolerance=t) for t in finest_tolerances]
     runs = {}
     failures: dict[str, str] = {}
     with pool(1, threads=None, renewed=True) as other:
@@ -176,7 +171,8 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
         response, ready = answer(prepared, scene), time.perf_counter()
         answer(prepared, scene)
         return response, ready - started, time.perf_counter() - ready, peak_memory()
-    tolerance = candidate.tolerance or PLANNED
+    planned = 0.05  # tolerance of a candidate without one
+    tolerance = candidate.tolerance or planned
     response = compute(scene, candidate.model, tolerance=tolerance, h=candidate.h, dt=candidate.dt)
     cold = time.perf_counter() - started
     return response, cold, cold, peak_memory()
@@ -192,7 +188,13 @@ def write(folder: Path, scene: Scene, outcome: Study) -> None:
         [(m.candidate.name, m in front, 100 * m.error, m.cold, m.warm, m.memory / 2**20, m.dofs)
          for m in outcome.results], name="tradeoff",
     )  # fmt: skip
-    picture = Picture(png(_figure(outcome), dpi=130), CAPTION, "tradeoff")
+    caption = (
+        "Error of the worst probe's waveform against the reference, over the time of a first "
+        "response (cold) and of another one on the same body (warm). The area of a marker is the "
+        "peak memory. A black edge marks the Pareto front: no other candidate is as accurate and "
+        "as fast both times."
+    )
+    picture = Picture(png(_figure(outcome), dpi=130), caption, "tradeoff")
     title = f"Speed against accuracy: {scene.name}"
     parts = sentences(outcome)
     verdict = [" ".join(parts[-len(BARS) :]), " ".join(parts[: -len(BARS)])]
