@@ -8,8 +8,6 @@ from typing import SupportsFloat
 import numpy as np
 from numpy.typing import ArrayLike
 
-SCALES = {"um": 1e6, "mm": 1e3}  # of units in which values in m are shown
-
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
@@ -138,7 +136,8 @@ def _check(
     what: str, value: SupportsFloat, reference: SupportsFloat, error: SupportsFloat, bar: float,
     unit: str = "",
 ) -> Check:  # fmt: skip
-    scale = SCALES.get(unit, 1.0)
+    scales = {"um": 1e6, "mm": 1e3}  # of units in which values in m are shown
+    scale = scales.get(unit, 1.0)
     return Check(
         what=what, value=scale * float(value), reference=scale * float(reference),
         error=float(error), bar=bar, unit=unit,

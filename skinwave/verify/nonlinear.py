@@ -19,7 +19,6 @@ from skinwave.verify.references import elastica as elastica_tip
 from skinwave.verify.references import karman_disc
 
 PAPER = BODIES["paper-sheet-loose"]
-SMALL = replace(PAPER, width=0.06, height=0.06)
 BONET = "Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (1997)"
 TIMOSHENKO = "Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells (1959), chapter 13"
 
@@ -139,9 +138,10 @@ def modes_or_all() -> Checks:
     """Sheet in its bending modes against all of its degrees of freedom."""
     tacton = Tacton(am_frequency=140.0, duration=0.02)
     pressure = MovingPressure(tacton=tacton, drive="pressure_squared")
-    scene = Scene(pressure=pressure, body=SMALL, probes=((0.0, 0.0), (0.01, 0.005)))
+    small = replace(PAPER, width=0.06, height=0.06)
+    scene = Scene(pressure=pressure, body=small, probes=((0.0, 0.0), (0.01, 0.005)))
     modes, full = (
-        compute(scene, model, h=SMALL.width / 8)
+        compute(scene, model, h=small.width / 8)
         for model in ("fem-nonlinear", "fem-nonlinear-transient")
     )
     swing = full.displacement - full.displacement.mean(axis=0)

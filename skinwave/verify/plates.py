@@ -31,20 +31,11 @@ from skinwave.verify.setups import (
     unit,
 )
 
-SUPPORTED = {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}  # Navier's supports
 # Lengths in m and material of two plates with known natural frequencies in 3-D.
 STEEL = ((10.0, 10.0, 1.0), fem.from_young(density=8000, young=200e9, poisson=0.3))
-SOFT = ((0.06, 0.06, 0.01), fem.Material(density=1000, shear_modulus=25e3, poisson=0.45))
-# Thickness over width, half waves along the width, and length over thickness of an element.
-SHEETS = (
-    (0.2, 1, 1), (0.05, 1, 1), (0.05, 1, 5), (0.01, 1, 1), (0.01, 1, 5), (0.01, 1, 20),
-    (1e-3, 1, 5), (1e-3, 1, 20), (1e-3, 1, 50), (1e-4, 5, 10), (1e-4, 5, 20), (1e-4, 5, 50),
-)  # fmt: skip
 ACHENBACH = "Achenbach, Wave Propagation in Elastic Solids (1973), chapter 6"
 NAVIER = f"Rayleigh-Lamb roots at k = pi hypot(m / a, n / b): {ACHENBACH}"
 LAMB = "Lamb, Proc R Soc A 98:205 (1920)"
-LAMBS_FACTOR = 0.669  # of rho_f a / (rho_p h): the lowest mode, fluid on one side
-LAG = 1.2e-3  # s: a wave of 80 Hz falls to 0.003 on its way across the sheet and back
 
 
 @case(
@@ -78,7 +69,12 @@ def clamped_sheet() -> Checks:
 )
 def thin_sheets() -> Checks:
     """Sheets of thickness / width 0.0001 to 0.2, elements of aspect 1 to 50."""
-    for thin, waves, aspect in SHEETS:
+    # Thickness over width, half waves along the width, and length over thickness of an element.
+    sheets = (
+        (0.2, 1, 1), (0.05, 1, 1), (0.05, 1, 5), (0.01, 1, 1), (0.01, 1, 5), (0.01, 1, 20),
+        (1e-3, 1, 5), (1e-3, 1, 20), (1e-3, 1, 50), (1e-4, 5, 10), (1e-4, 5, 20), (1e-4, 5, 50),
+    )  # fmt: skip
+    for thin, waves, aspect in sheets:
         deflection, exact, kirchhoff = _strip_bending(thin * waves, aspect)
         what = f"thickness / width {thin:g}, half waves {waves}, aspect {aspect}"
         bar = 0.01 if thin * waves * aspect < 0.1 else 0.02
@@ -90,7 +86,8 @@ def in_plane_shear() -> Checks:
     """In-plane shear of a plate with four cells per half wave."""
     lengths, material = STEEL
     exact = material.shear_speed * np.hypot(1 / lengths[0], 1 / lengths[1]) / 2
-    hz = frequencies(_plate(lengths, (4, 4, 1)), material, SUPPORTED, 40)
+    supported = {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}  # Navier's supports
+    hz = frequencies(_plate(lengths, (4, 4, 1)), material, supported, 40)
     yield relative("half waves 1, 1", nearest(hz, exact), exact, 3e-3, "Hz")
 
 
@@ -102,7 +99,8 @@ def in_plane_shear() -> Checks:
 def navier() -> Checks:
     """Plates on Navier's supports, thickness / side 0.1 and 0.17, nu 0.3 and 0.45."""
     cells = (8, 12, 16)
-    for lengths, material in (STEEL, SOFT):
+    soft = ((0.06, 0.06, 0.01), fem.Material(density=1000, shear_modulus=25e3, poisson=0.45))
+    for lengths, material in (STEEL, soft):
         upper = (lengths[0] / 2, lengths[1] / 2, lengths[2] / 2)
 
         def plate(
@@ -175,7 +173,8 @@ def air_operator() -> Checks:
     factor = lamb / (2 * np.pi) / (np.pi / 5)  # int (1 - r^2)^4 dA = pi/5
     yield order("order in the spacing, Gaussian", sizes, errors, 2, 0.1)
     yield relative("Gaussian, 32 nodes per standard deviation", 1 - errors[-1], 1.0, 5e-5)
-    yield relative("Lamb's factor of the added mass, one side", factor, LAMBS_FACTOR, 1e-3)
+    lambs_factor = 0.669  # of rho_f a / (rho_p h): the lowest mode, fluid on one side
+    yield relative("Lamb's factor of the added mass, one side", factor, lambs_factor, 1e-3)
 
 
 @case(
@@ -216,9 +215,10 @@ def focus_in_air() -> Checks:
     """Focus on a large, lossy sheet in air: finite elements against the infinite sheet."""
     thickness = 1e-3
     young = 12 * PAPER["bending_stiffness"] * (1 - 0.3**2) / thickness**3
+    lag = 1.2e-3  # s: a wave of 80 Hz falls to 0.003 on its way across the sheet and back
     solid = fem.Material(
         density=PAPER["mass_per_area"] / thickness, shear_modulus=young / 2.6, poisson=0.3,
-        viscosity=LAG * young / 2.6,
+        viscosity=lag * young / 2.6,
     )  # fmt: skip
     mesh = meshes.sheet(2 * 0.168, 2 * 0.168, thickness, 4e-3)
     mesh = meshes.half(meshes.half(mesh, "x"), "y")
@@ -233,7 +233,7 @@ def focus_in_air() -> Checks:
     model = replace(model, outputs=S @ model.basis)
     amplitudes = fem.transfer(model, model.basis.T @ force, hz)[..., 0]
     paper = replace(fem.PRESETS["paper"], loss_factor=0.0)
-    paper = replace(paper, viscosity=LAG * paper.shear_modulus)
+    paper = replace(paper, viscosity=lag * paper.shear_modulus)
     sheet = thin_sheet(paper, THICKNESS, air_density=AIR_DENSITY)
     exact = point_response(sheet, radii, 2 * np.pi * hz, WIDTH)
     for f, ours, theirs in zip(hz, amplitudes, exact, strict=True):

@@ -32,7 +32,6 @@ BODIES: Mapping[str, Body] = {
 }  # fmt: skip
 GRID = np.arange(10.0, 701.0, 10.0)  # Hz: fine enough to track modes
 AT_REST = 1e-3  # Hz, in place of 0, for the static speed of a half-space
-FIT_RANGE = (0.010, 0.040)  # m from the focus, over which an exponent is fitted
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,7 +81,8 @@ def _amplitude(mode: Mode) -> Floats:
 
 def decay_exponents(body: Body, frequencies: ArrayLike) -> Floats:
     """Return exponents n (f,) of distance^-n fitted to the motion around a focus at rest."""
-    r, w = np.geomspace(*FIT_RANGE, 12), 2 * np.pi * np.asarray(frequencies)
+    fit_range = (0.010, 0.040)  # m from the focus, over which an exponent is fitted
+    r, w = np.geomspace(*fit_range, 12), 2 * np.pi * np.asarray(frequencies)
     motion = point_response(compliance(body), r, w, spot_width(NOMINAL_HEIGHT))
     return -np.polyfit(np.log(r), np.log(np.abs(motion)).T, 1)[0]
 
@@ -126,7 +126,6 @@ def least_impedance(body: Body, area: float) -> float:
 
 SPEEDS = np.arange(1.0, 16.1, 0.5)  # m/s, of a focus on a circle
 PERIMETERS = (0.100, 0.060)  # m: two, to separate effects of speed and of frequency
-SAMPLES = 256  # per turn
 
 
 def focus_speeds(body: Body, perimeter: float) -> tuple[Floats, Floats]:
@@ -135,10 +134,11 @@ def focus_speeds(body: Body, perimeter: float) -> tuple[Floats, Floats]:
     """
     waves, probe = compliance(body), [[perimeter / (2 * np.pi), 0.0]]
     courses = []
+    samples = 256  # per turn
     for speed in SPEEDS:
         circle = Trajectory(shape="circle", size=perimeter / np.pi, speed=speed)
         pressure = MovingPressure(tacton=Tacton(trajectory=circle), peak_pressure=1.0)
-        times = np.arange(SAMPLES) / circle.drawing_frequency / SAMPLES
+        times = np.arange(samples) / circle.drawing_frequency / samples
         courses.append(steady_state(waves, pressure, probe, times).values[:, 0])
     deflections = np.array(courses)
     return deflections.max(axis=1), np.ptp(deflections, axis=1)
@@ -157,8 +157,6 @@ def peak(x: Floats, y: Floats) -> float:
 HAND_UP = "-x"  # direction of the palm in the file of a hand
 HAND_SIZE = 6.5e-3  # m, of elements: 5 and 8 mm change the 1/e lengths by up to 8 %
 HAND_FREQUENCIES = (200.0, 300.0, 400.0)  # Hz
-FOCUS_DISTANCE = 0.010  # m from the tip
-PLACES = np.arange(0.020, 0.171, 0.010)  # m from the tip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -188,10 +186,12 @@ def along_finger(
     along = top @ np.linalg.svd(top - top.mean(axis=0), full_matrices=False)[2][0]
     tip = top[np.argmax(along if along.max() > -along.min() else -along)]
     inwards = -tip / np.linalg.norm(tip)
-    distances = PLACES[np.linalg.norm(tip) + 0.04 > PLACES]
+    places = np.arange(0.020, 0.171, 0.010)  # m from the tip
+    distances = places[np.linalg.norm(tip) + 0.04 > places]
     report("assemble", 0.1)
     matrices, (P, points) = operators(made), surface_load(made)
-    place = points - [*(tip + FOCUS_DISTANCE * inwards), 0.0]
+    focus_distance = 0.010  # m from the tip
+    place = points - [*(tip + focus_distance * inwards), 0.0]
     load = P @ MovingPressure(tacton=Tacton(), peak_pressure=1.0)(place, 0.0)
     S = surface_motion(body, made, tip + distances[:, None] * inwards)
     amplitudes = []

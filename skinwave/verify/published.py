@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 
-SKIN_DENSITY = 1000.0  # kg/m3
-RAYLEIGH = 0.955313  # speed of Rayleigh waves over that of shear waves, nu = 0.5
 ALL = "All sources"  # start of the names of `all_sources`
 
 
@@ -33,7 +31,6 @@ EXPONENT = Quantity("decay exponent", "")
 FOCUS_SPEED = Quantity("speed of the focus", "m/s")
 FORCE = Quantity("force at the detection threshold", "mN", 1e-3)
 SOFTEST = Quantity("frequency of least impedance", "Hz")
-QUANTITIES = {each.name: each for each in (SPEED, LENGTH, EXPONENT, FOCUS_SPEED, FORCE, SOFTEST)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,13 +72,16 @@ def rayleigh_wave(modulus: float, viscosity: float, frequency: float) -> tuple[f
     Kelvin-Voigt solid: k = w sqrt(rho/(mu1 + i w mu2)) / 0.9553.
     """
     w = 2 * np.pi * frequency
-    k = w * np.sqrt(SKIN_DENSITY / (modulus + 1j * w * viscosity)) / RAYLEIGH
+    skin_density = 1000.0  # kg/m3
+    rayleigh = 0.955313  # speed of Rayleigh waves over that of shear waves, nu = 0.5
+    k = w * np.sqrt(skin_density / (modulus + 1j * w * viscosity)) / rayleigh
     return float(w / k.real), float(1 / abs(k.imag))
 
 
 def _read_published(table: dict[str, Any]) -> Published:
     """Return a set of values from its table in the file."""
-    quantity = QUANTITIES[table.pop("quantity")]
+    known = SPEED, LENGTH, EXPONENT, FOCUS_SPEED, FORCE, SOFTEST
+    quantity = {each.name: each for each in known}[table.pop("quantity")]
     frequencies = tuple(map(float, table.pop("frequencies")))
     numbers = {"values": (np.nan,) * len(frequencies)} | {
         name: tuple(quantity.size * x for x in table.pop(name))

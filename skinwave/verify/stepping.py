@@ -18,7 +18,6 @@ HUGHES = "Hughes, The Finite Element Method (1987), chapter 9"
 MEIROVITCH = "Meirovitch, Principles and Techniques of Vibrations (1997)"
 SKIN: dict[str, Any] = {"density": 1000.0, "shear_modulus": 25e3, "poisson": 0.4999}
 BLOCK = "block of 2 by 2 by 1 cells, nu = 0.4999"
-MODULUS, TIME = 0.8, 0.7  # of an oscillator's Maxwell branch: stiffness and relaxation time
 
 
 def oscillator(damping: float = 0.0) -> fem.Operators:
@@ -93,8 +92,9 @@ def order_in_time() -> Checks:
     exact = references.driven_oscillator(2.0, damping=0.2, drive=3.0)
     yield from _order_of_steps(oscillator(0.2), exact, 100, "damped")
     plain = oscillator()
-    ops = replace(plain, branches=(fem.MaxwellBranch(K=MODULUS * plain.K, time=TIME),))
-    exact = references.driven_oscillator(2.0, modulus=MODULUS, time=TIME, drive=3.0)
+    modulus, time = 0.8, 0.7  # of an oscillator's Maxwell branch: stiffness and relaxation time
+    ops = replace(plain, branches=(fem.MaxwellBranch(K=modulus * plain.K, time=time),))
+    exact = references.driven_oscillator(2.0, modulus=modulus, time=time, drive=3.0)
     yield from _order_of_steps(ops, exact, 200, "with a Maxwell branch")
     for dt in (0.01, 30.0):
         states = fem.with_energy_balance(ops, fem.transient(ops, _drive, dt), _drive)

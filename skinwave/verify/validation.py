@@ -44,7 +44,7 @@ COLOURS = {
     "forearm": "#D55E00", "palm": "#0072B2", "palm-stiff": "#56B4E9", "skin-slab": "#009E73",
     "palm-layers": "#CC79A7", "forearm-layers": "#E69F00", HAND: "#000000",
 }  # fmt: skip
-BAND, MARKERS = "#dddddd", "osv^DPX"
+BAND = "#dddddd"
 DRAWN_FACTOR = 10.0  # larger factors are drawn at this one
 SCOPE = (
     "Verification checks that the equations are solved correctly. This page checks whether they "
@@ -53,11 +53,6 @@ SCOPE = (
     "other values are predictions. A factor is the model's value over the published value, or over "
     "the nearer end of its spread."
 )
-FACTORS = (
-    "Each point is a preset at a frequency. Grey: within 5 %, the accuracy of reading a curve. "
-    "Hollow: the preset was fitted to that source. Filled: it predicts the source. "
-    f"Factors beyond {DRAWN_FACTOR:g} are drawn at {DRAWN_FACTOR:g}."
-)
 SPEEDS = (
     "Points: sources, with the spread between people or a standard deviation where published. "
     "Grey: range over all sources at each frequency. Lines: for each preset, the wave that moves "
@@ -65,12 +60,6 @@ SPEEDS = (
     "line breaks where another mode leads, and ends where no wave propagates. Lengths are those of "
     "plane waves, without geometric spreading."
 )
-
-
-QUANTITY_COLUMNS = (
-    "independent comparisons", "values", "within", "too low", "median factor", "too high",
-    "median factor", "sources differ by a factor of up to",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -237,8 +226,13 @@ def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
     sources = {row.published.name: row.published for row in rows}
     first, *others = verdict(rows)
     own = [row for row in rows if not row.is_built and not row.published.name.startswith(ALL)]
+    factors = (
+        "Each point is a preset at a frequency. Grey: within 5 %, the accuracy of reading a curve. "
+        "Hollow: the preset was fitted to that source. Filled: it predicts the source. "
+        f"Factors beyond {DRAWN_FACTOR:g} are drawn at {DRAWN_FACTOR:g}."
+    )
     parts: list[Part] = [
-        _picture("factors", _factors, (10.5, 0.24 * len(sources) + 1.2), FACTORS, rows),
+        _picture("factors", _factors, (10.5, 0.24 * len(sources) + 1.2), factors, rows),
         " ".join([others[0], *others[1 + len(QUANTITIES):]]), SCOPE,
         Details("Every set and preset", [_summary(rows)]),
         Details("Every value", [_table(rows)]),
@@ -250,7 +244,11 @@ def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
         )]),
         Details("Published but not compared", [Table(["source", "what", "reason"], NOT_COMPARED)]),
     ]  # fmt: skip
-    table = Table(QUANTITY_COLUMNS, _by_quantity(own))
+    quantity_columns = (
+        "independent comparisons", "values", "within", "too low", "median factor", "too high",
+        "median factor", "sources differ by a factor of up to",
+    )  # fmt: skip
+    table = Table(quantity_columns, _by_quantity(own))
     return Report("Models and published measurements", [first], [table, contents(parts), *parts])
 
 
@@ -362,7 +360,8 @@ def _sources(ax: Axes, quantity: Quantity) -> None:
     low, high = (np.array(x) / size for x in (whole.lows, whole.highs))
     ax.fill_between(whole.frequencies, low, high, color=BAND, lw=0, zorder=0)
     sets = [each for each in WAVES if each.quantity is quantity]
-    for marker, each in zip(MARKERS, sets, strict=False):
+    markers = "osv^DPX"
+    for marker, each in zip(markers, sets, strict=False):
         low, high = np.array([each.between(k) for k in range(len(each.values))]).T / size
         middle = np.where(np.isnan(each.values), (low + high) / 2, np.array(each.values) / size)
         errors = np.stack([middle - low, high - middle]) if each.lows else None
