@@ -42,11 +42,6 @@ from simple_model.layers.material import Material
 
 QUADRATIC = 6  # nodes of a facet
 STATIONS, STATION_WEIGHTS = np.polynomial.legendre.leggauss(2)  # through each layer, along edges
-# Penalty over D L / A, with bending stiffness D and area A of a facet and length L of its edge: the
-# smallest for which the stiffness of a facet bounds its moments at three edges, int m^2 ds <= L/A
-# int m^2 dA for the constant moments of quadratic facets. A larger penalty makes bending too stiff;
-# with 0.85 of this one some modes have negative stiffness.
-PENALTY = 3 / 4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -206,7 +201,12 @@ def _edge_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> sp
     moment, bending = _moments(surface, coat, mu, lam)
     corners = surface.points[edges.facet, :3]
     area = np.linalg.norm(np.cross(*np.diff(corners, axis=1).swapaxes(0, 1)), axis=1) / 2
-    penalty = PENALTY * edges.sides * bending * edges.lengths.sum(axis=1) / area
+    # Penalty over D L / A, with bending stiffness D and area A of a facet and length L of its edge:
+    # the smallest for which the stiffness of a facet bounds its moments at three edges, int m^2 ds
+    # <= L/A int m^2 dA for the constant moments of quadratic facets. A larger penalty makes bending
+    # too stiff; with 0.85 of this one some modes have negative stiffness.
+    penalty_factor = 3 / 4
+    penalty = penalty_factor * edges.sides * bending * edges.lengths.sum(axis=1) / area
     lengths = np.zeros((edges.edge.max(initial=-1) + 1, points))
     lengths[edges.edge] = edges.lengths / edges.sides[:, None]
     weights = lengths * np.bincount(edges.edge, penalty, len(lengths))[:, None]

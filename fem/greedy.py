@@ -33,9 +33,7 @@ from fem.affine_model import (
 from fem.krylov import reduce
 from fem.typing import Array, Complex, Floats, Ints
 
-MOST_BASES = 6
 DEPENDENT = 1e-10  # remainder of a direction outside a basis, or its square, that is round-off
-MOST_STATES = 80  # of one line
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,7 +83,7 @@ def reduce_affine(
 
     Other variants are interpolated between the geometries (g,). Materials of the training set have
     no modulus laws. Errors are checked at lines with frequencies (f,) in Hz. `band` and `solver`
-    are those of `reduce`. Raises a ValueError if `MOST_BASES` variants are not enough.
+    are those of `reduce`. Raises a ValueError if `most_bases` variants are not enough.
     """
     t = min(range(len(training)), key=lambda each: _loss(training[each].solids))
     first = training[t].geometry()
@@ -94,7 +92,8 @@ def reduce_affine(
     parts = np.zeros((len(geometries), len(first.affine.parts), 0, 0))
     errors: dict[int, float] = {}
     nested = 3 / 4  # of the vectors: the smaller basis, from which the change is computed
-    for step in range(min(MOST_BASES, len(training))):
+    most_bases = 6
+    for step in range(min(most_bases, len(training))):
         visited.add(t)
         full = training[t].geometry()
         reduced = reduce(
@@ -243,7 +242,7 @@ def line_bases(
     those of a training set, and the largest error of the last comparisons.
 
     `weights` (t, f, q) are those of the terms for each material and line, `shares` (t, g) those of
-    its geometries. Raises a ValueError if `MOST_STATES` are not enough.
+    its geometries. Raises a ValueError if `most_states` are not enough.
     """
     lines = range(model.forces.shape[1])
     nothing = np.zeros((model.parts.shape[-1], 0))
@@ -253,7 +252,8 @@ def line_bases(
     in_a_row = 3  # predictions within the tolerance that end the search
     expected_states = 25  # of one line, for the progress
     settled = 0.1  # of the tolerance: lines with less error need no further state
-    for _ in range(min(MOST_STATES, len(weights))):
+    most_states = 80  # of one line
+    for _ in range(min(most_states, len(weights))):
         t = int(np.argmax(np.where(left, changes, -1)))
         left[t] = False
         exact = steady_states(model, weights[t], shares[t], lines)

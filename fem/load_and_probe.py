@@ -16,7 +16,6 @@ from meshes import TetMesh, facet_set
 
 FACET_MARGIN = 1e-6  # barycentric: points this close outside a facet count as on it
 NEWTON_TOLERANCE = 1e-9  # of a facet's size
-NODES = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])  # of a facet
 
 
 def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
@@ -120,11 +119,13 @@ def node_operator(
     """
     nodes = facet_set(mesh, facets)
     surface, local = np.unique(nodes, return_inverse=True)
+    # Of a facet.
+    node_places = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])
     if patch:
         normals = _mean_normals(mesh, nodes, mesh.points[surface], patch)
     else:
         normals, own = np.zeros((len(surface), 3)), local.reshape(nodes.shape)
-        for number, at in enumerate(NODES[: nodes.shape[1]]):
+        for number, at in enumerate(node_places[: nodes.shape[1]]):
             here = np.broadcast_to(at, (len(nodes), 3))
             np.add.at(normals, own[:, number], np.cross(*_facet_tangents(mesh, nodes, here)))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

@@ -24,7 +24,6 @@ from fem.typing import Floats
 
 MOST_ITERATIONS = 25
 MOST_HALVINGS = 6  # of a load or time step
-ROUND_OFF = 1e-5  # of the load: a smaller residual is judged by the correction it causes
 
 
 class _Stuck(ArithmeticError):
@@ -46,7 +45,7 @@ def static(
     body : Elastic
     force : (3 n,) float, N
     start : (3 n,) float, m, initial guess; undeformed by default
-    tolerance : largest residual relative to the force; or, for residuals below `ROUND_OFF`, largest
+    tolerance : largest residual relative to the force; or, for residuals below 1e-5, largest
         correction relative to the displacement
     solver : backend of `factorise`
 
@@ -94,6 +93,7 @@ def _newton(
     solver: str,
 ) -> Floats:
     residual = np.inf
+    round_off = 1e-5  # of the load: a smaller residual is judged by the correction it causes
     for _ in range(MOST_ITERATIONS):
         r, size = unbalanced(u)
         residual = float(np.linalg.norm(r)) / (size or 1.0)
@@ -107,7 +107,7 @@ def _newton(
             break
         # The residual of thin bodies may be round-off of cancelling forces, which moves nothing.
         size = float(np.linalg.norm(u))
-        if residual <= ROUND_OFF and float(np.linalg.norm(step)) <= tolerance * size:
+        if residual <= round_off and float(np.linalg.norm(step)) <= tolerance * size:
             return u + step
         if float(step @ r) <= 0.0:  # likewise, for solvers that raise no error
             break

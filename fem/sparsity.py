@@ -11,7 +11,6 @@ from scipy import sparse
 from fem.typing import Array, Bools, Floats, Index, Ints
 from meshes import MeshError
 
-SLAB = 256  # elements at a time, so that temporaries stay in the processor's cache
 UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and above the diagonal
 
 
@@ -164,5 +163,6 @@ def row_starts_of(kept: Bools, indptr: NDArray[np.integer[Any]]) -> Index:
 
 
 def slabs(count: int) -> list[slice]:
-    """Return slices of `SLAB` elements each."""
-    return [slice(start, start + SLAB) for start in range(0, count, SLAB)]
+    """Return slices of `at_once` elements each."""
+    at_once = 256  # elements at a time, so that temporaries stay in the processor's cache
+    return [slice(start, start + at_once) for start in range(0, count, at_once)]

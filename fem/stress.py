@@ -38,11 +38,6 @@ from simple_model.layers.material import Material
 from simple_model.layers.tensors import DIAGONAL, MEAN, TENSOR
 
 POINTS = 4  # quadrature points of an element, of the rule for degree 2
-LOCALITY = 1.0  # weight exp(-LOCALITY d^2) of a sample d elements from the point; 0.7 to 5 tried
-DEGREES = (3, 2, 1, 0)  # of polynomials; the highest that the samples determine is used
-# Symmetric gradient: e_c = sum_ij SYMMETRIC[c, i, j] u_j,i
-SYMMETRIC = np.array([[[(i, j) in (c, c[::-1]) for j in range(3)] for i in range(3)]
-                      for c in TENSOR]) / np.array([1, 1, 1, 2, 2, 2])[:, None, None]  # fmt: skip
 
 
 def strain_operator(
@@ -184,17 +179,20 @@ def _size(mesh: TetMesh, patch: Ints) -> Floats:
 def fitted_polynomial(x: Floats) -> tuple[Floats, int]:
     """Fit a polynomial to samples at places x (s, 2 or 3), in element sizes from a point.
 
-    The degree is the highest of `DEGREES` with half as many coefficients as samples. Returns the
+    The degree is the highest of `degrees` with half as many coefficients as samples. Returns the
     coefficients (n, s) of `polynomials` per value of each sample, first the value at the point, and
     the degree.
     """
-    root = np.exp(-LOCALITY / 2 * (x**2).sum(axis=1))  # of the weights
+    # Weight exp(-locality d^2) of a sample d elements from the point; 0.7 to 5 tried.
+    locality = 1.0
+    root = np.exp(-locality / 2 * (x**2).sum(axis=1))  # of the weights
     independent = 1e-8  # of the largest singular value
-    for degree in DEGREES:
+    degrees = (3, 2, 1, 0)  # of polynomials; the highest that the samples determine is used
+    for degree in degrees:
         fitted = root[:, None] * polynomials(x, degree)
         left, sizes, right = np.linalg.svd(fitted, full_matrices=False)
         enough = len(x) >= 2 * len(sizes) and sizes[-1] > independent * sizes[0]
-        if enough or degree == DEGREES[-1]:
+        if enough or degree == degrees[-1]:
             break
     return np.asarray((right.T / sizes) @ left.T * root), degree
 
@@ -210,7 +208,10 @@ def _strain_rows(mesh: TetMesh, used: Ints) -> sparse.csr_array:
     """Return the strain (24 k, 3 n) at the quadrature points of some elements (k,)."""
     part = elements_of(mesh, used)
     slopes, _ = gradients(shape_nodes(part), part.tets.shape[1], 2, 0)
-    values = np.einsum("cij,eqia->eqcaj", SYMMETRIC, slopes)
+    # Symmetric gradient: e_c = sum_ij symmetric[c, i, j] u_j,i
+    both = [[[(i, j) in (c, c[::-1]) for j in range(3)] for i in range(3)] for c in TENSOR]
+    symmetric = np.array(both) / np.array([1, 1, 1, 2, 2, 2])[:, None, None]
+    values = np.einsum("cij,eqia->eqcaj", symmetric, slopes)
     rows = np.arange(values[..., 0, 0].size).reshape(*values.shape[:3], 1, 1)
     columns = dofs_of(part.tets)[:, None, None]
     return from_entries(values, rows, columns, (values[..., 0, 0].size, mesh.n_dofs))

@@ -25,8 +25,6 @@ log = logging.getLogger(__name__)
 
 EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 FACES = np.array([[1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6], [0, 1, 3, 4, 8, 7], [0, 2, 1, 6, 5, 4]])
-VTK_KINDS, VTK_SETS = {4: 10, 10: 24}, "facets:"  # cell type by node count; prefix of facet sets
-FURTHEST = 1e50  # m: beyond it, products of lengths overflow
 
 
 class MeshError(ValueError):
@@ -47,7 +45,7 @@ class TetMesh:
     unmoved : (n, 3) float, m, points before nodes were moved; their edges group the elements
 
     Raises a MeshError if shapes or node numbers do not fit, if a point is not finite or is further
-    away than `FURTHEST`, or if a tetrahedron is flat.
+    away than 1e50 m, or if a tetrahedron is flat.
 
     >>> from meshes import block
     >>> mesh = block((0.04, 0.03, 0.01), 0.01)
@@ -108,12 +106,14 @@ class TetMesh:
 
         nodes = self.tets.shape[1]
         cells = np.insert(self.tets, 0, nodes, axis=1).ravel()
-        kinds = np.full(len(self.tets), VTK_KINDS[nodes], np.uint8)
+        # Cell type by node count; prefix of facet sets.
+        vtk_kinds, vtk_sets = {4: 10, 10: 24}, "facets:"
+        kinds = np.full(len(self.tets), vtk_kinds[nodes], np.uint8)
         grid = pv.UnstructuredGrid(cells, kinds, self.points.copy())
         grid.cell_data["region"] = self.region.copy()
         for name, facets in self.facets.items():
             if len(facets):  # VTK has no empty arrays
-                grid.field_data[VTK_SETS + name] = facets.copy()
+                grid.field_data[vtk_sets + name] = facets.copy()
         return grid
 
 
@@ -272,7 +272,8 @@ def _check(points: Floats, tets: Ints) -> None:
 
 def check_finite(points: Floats) -> None:
     """Refuse points (n, 3) that are not finite, or whose products would overflow."""
-    bad = np.flatnonzero(~(np.abs(points) <= FURTHEST).all(axis=1))
+    furthest = 1e50  # m: beyond it, products of lengths overflow
+    bad = np.flatnonzero(~(np.abs(points) <= furthest).all(axis=1))
     if len(bad):
         raise MeshError(
             f"{len(bad):,} points are not finite, first point {bad[0]}; repair the file"

@@ -24,7 +24,6 @@ from meshes.typing import Floats
 
 BY_MESHIO = {".msh": "gmsh", ".mesh": "medit", ".med": "med", ".off": "off"}
 OTHERWISE = "save it as .vtu (ParaView, meshio convert) or .msh (gmsh)"
-SOLID = 3  # dimension
 
 
 def read_file(path: Path) -> Contents:
@@ -119,7 +118,8 @@ def _read_vtk(path: Path) -> Any:
     kinds = {
         k: pyvista.CellType(k) for _, grid in parts for k in np.unique(grid.celltypes).tolist()
     }
-    solids = [k for k, kind in kinds.items() if kind.dimension == SOLID]
+    solid_dimension = 3  # dimension
+    solids = [k for k, kind in kinds.items() if kind.dimension == solid_dimension]
     names = dict.fromkeys(name for name, grid in parts if np.isin(grid.celltypes, solids).any())
     tagged = [grid.n_cells for name, grid in parts if name in shared and name in names]
     solid = [name for name in names if name not in shared]

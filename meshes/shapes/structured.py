@@ -27,8 +27,6 @@ from meshes.tetmesh import (
 )
 from meshes.typing import Floats, Ints
 
-MOST_UNKNOWNS = 3_000_000  # degrees of freedom whose factorisation fits in a workstation
-
 Lines = tuple[Floats, Floats, Floats]  # m, increasing, along x, y and z
 
 
@@ -336,11 +334,12 @@ def _cells(length: float, h: float, *, least: int = 2) -> Floats:
 
 
 def check_size(cells: Iterable[float], order: int = 2) -> None:
-    """Refuse numbers of cells along the three axes that give more than `MOST_UNKNOWNS`."""
+    """Refuse numbers of cells along the three axes that give more than `most_unknowns`."""
     unknowns = 3.0 * prod(order * n + 1 for n in cells)
-    if not unknowns <= MOST_UNKNOWNS:
+    most_unknowns = 3_000_000  # degrees of freedom whose factorisation fits in a workstation
+    if not unknowns <= most_unknowns:
         raise MeshError(
-            f"{unknowns:.2g} or more degrees of freedom exceed the limit of {MOST_UNKNOWNS:,}; "
+            f"{unknowns:.2g} or more degrees of freedom exceed the limit of {most_unknowns:,}; "
             "use larger elements or a smaller body"
         )
 

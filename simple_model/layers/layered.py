@@ -30,8 +30,6 @@ from simple_model.layers.material import Material
 from simple_model.layers.stack import Stack
 from simple_model.typing import Complex, Floats
 
-THIN = 0.3  # thickness times wavenumber, below which differences of exponentials lose digits
-WEAKEST = 0.1  # of the mean decay: decay of a mode that is mostly in a layer without loss
 Transfer = Callable[[Complex, Complex], Complex]
 Pair = tuple[Any, Any]  # horizontal and vertical
 Symmetric = tuple[Any, Any, Any]  # of complex arrays, a, b, c of [[a, b], [b, c]]
@@ -162,13 +160,14 @@ def _resonance(
 
 
 def _decay(stack: Stack, w: Complex) -> Floats:
-    """Smallest decay (f,) in 1/m of shear waves; `WEAKEST` of the mean if a layer is lossless."""
+    """Smallest decay (f,) in 1/m of shear waves; `weakest` of the mean if a layer is lossless."""
     waves = [np.sqrt(m.density * w**2 / _shear(m, w)) for m in stack.materials]
     decay = np.abs(np.imag(waves))
     finite = [thickness for thickness in stack.thicknesses if isfinite(thickness)]
     share = np.minimum(stack.thicknesses, sum(finite))  # a half-space counts as all above it
     share = share / share.sum()
-    return np.where((decay > 0).all(axis=0), decay.min(axis=0), WEAKEST * (share @ decay))
+    weakest = 0.1  # of the mean decay: decay of a mode that is mostly in a layer without loss
+    return np.where((decay > 0).all(axis=0), decay.min(axis=0), weakest * (share @ decay))
 
 
 def _cut(stack: Stack, depths: Sequence[float]) -> tuple[Stack, list[int]]:
@@ -271,7 +270,9 @@ def _one_minus_exp(p: Complex, thickness: float) -> Complex:
         return np.ones_like(p)
     x = -thickness * p
     lacking = 1 - np.exp(x)
-    thin = np.abs(x.real) + np.abs(x.imag) < THIN
+    # Thickness times wavenumber, below which differences of exponentials lose digits.
+    thin_below = 0.3
+    thin = np.abs(x.real) + np.abs(x.imag) < thin_below
     lacking[thin] = -np.expm1(x[thin])  # slower than exp
     return np.asarray(lacking)
 

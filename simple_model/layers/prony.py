@@ -28,14 +28,8 @@ ModulusLaw = Callable[[Any], Any]  # complex shear modulus in Pa at angular freq
 
 BAND = (1.0, 2000.0)  # Hz: lines of loads, and modes that they excite
 FIT_TOLERANCE = 0.005  # relative deviation of a series; motion near resonances deviates more
-# Measured moduli with random errors of 5 % in both parts are 7 % from every causal law; a
-# hysteretic loss factor of 0.2 is 10 % away, of 0.3 15 %. The limit applies to the root mean
-# square, so single outliers pass; a warning states their size.
-CAUSAL = 0.10
 
 
-REFERENCE = 150.0  # Hz, where the storage modulus is the given one
-LOSS_BAND = (10.0, 2000.0)  # Hz, where the loss factor is nearly constant
 SLOWEST = 8.0  # Hz, 1 / (2 pi time): best for losses up to 2
 LARGEST_LOSS_FACTOR = 10.0
 
@@ -151,17 +145,21 @@ def fit_prony(
 
 def check_modulus(frequencies: Floats, moduli: Complex) -> None:
     """Refuse complex moduli (f,) in Pa at ascending frequencies (f,) in Hz unless they are passive
-    and causal. Causal moduli are close to a series of non-negative terms (`CAUSAL`).
+    and causal. Causal moduli are close to a series of non-negative terms (`causal`).
     """
     check_passive(frequencies, moduli)
     w = 2 * np.pi * frequencies
     times = 1 / np.geomspace(w[0] / 30, w[-1] * 30, 9 + round(3 * np.log10(w[-1] / w[0])))
     away = np.abs(fitted_series(w, moduli, times, None, (0.0, 0.0))(w) - moduli) / np.abs(moduli)
     mean, worst = float(np.sqrt(np.mean(away**2))), int(away.argmax())
-    if mean > CAUSAL:
+    # Measured moduli with random errors of 5 % in both parts are 7 % from every causal law; a
+    # hysteretic loss factor of 0.2 is 10 % away, of 0.3 15 %. The limit applies to the root mean
+    # square, so single outliers pass; a warning states their size.
+    causal = 0.10
+    if mean > causal:
         raise ValueError(
             f"the complex modulus is not causal: it differs by {100 * mean:.0f} % from the nearest "
-            f"relaxing solid (root mean square; the limit is {100 * CAUSAL:g} %), at "
+            f"relaxing solid (root mean square; the limit is {100 * causal:g} %), at "
             f"{frequencies[worst]:.3g} Hz by {100 * away[worst]:.0f} %; the storage modulus must "
             "rise where the loss modulus is large: check both, or give a loss_factor"
         )
@@ -218,7 +216,7 @@ def fitted_series(
 @lru_cache(maxsize=1024)
 def constant_loss(loss_factor: float) -> PronySeries:
     """Return the modulus law of a nearly constant loss factor above 0, relative to the storage
-    modulus at `REFERENCE`.
+    modulus at `reference`.
 
     A modulus mu (1 + i eta) with one eta at all frequencies is not causal. The solid of constant
     loss factor eta has the modulus
@@ -228,15 +226,17 @@ def constant_loss(loss_factor: float) -> PronySeries:
     (Kjartansson, J Geophys Res 84:4737 (1979), doi 10.1029/JB084iB09p04737), which is 0 at rest. A
     few Maxwell branches with log-spaced times approximate it over a band and have a modulus at rest
     (Emmerich and Korn, Geophysics 52:1252 (1987), doi 10.1190/1.1442386). They define the loss
-    factor in every model: eta within 2.5 % over `LOSS_BAND` up to eta = 2, within 10 % beyond, half
+    factor in every model: eta within 2.5 % over `loss_band` up to eta = 2, within 10 % beyond, half
     of it at 3 Hz, and 0 at rest, where the modulus is 0.92, 0.76 and 0.35 mu for eta = 0.03, 0.1
     and 0.4.
     """
     loss_frequencies = 93  # at which the series is fitted
-    w, w_0 = 2 * np.pi * np.geomspace(*LOSS_BAND, loss_frequencies), 2 * np.pi * REFERENCE
+    reference = 150.0  # Hz, where the storage modulus is the given one
+    loss_band = (10.0, 2000.0)  # Hz, where the loss factor is nearly constant
+    w, w_0 = 2 * np.pi * np.geomspace(*loss_band, loss_frequencies), 2 * np.pi * reference
     power = 2 / np.pi * np.arctan(loss_factor)
     exact = (1j * w / w_0) ** power / np.cos(np.pi * power / 2)
     fastest, loss_terms = 1600.0, 4  # Hz, 1 / (2 pi time): best for losses up to 2
     times = 1 / (2 * np.pi * np.geomspace(SLOWEST, fastest, loss_terms))
-    series = fitted_series(w, exact, times, None, LOSS_BAND)
+    series = fitted_series(w, exact, times, None, loss_band)
     return series.scaled(1 / float(series(w_0).real))

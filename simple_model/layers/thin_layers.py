@@ -26,7 +26,6 @@ from simple_model.layers.stack import Stack
 from simple_model.typing import Complex, Floats
 
 ORDER = 8
-SHIFT = 0.1 + 1.0j  # of the largest squared shear wavenumber
 MATCHED = np.exp(-0.6j) * np.array([0.75, 1.5, 3.0, 6.0, 12.0])  # element lengths over 1/|k_s|
 
 
@@ -143,8 +142,9 @@ def eigenpairs(terms: Pencil, omega: Floats) -> tuple[Complex, Complex, Complex]
     first[:, n:, n:] = terms.Aww[..., None] * np.eye(n)
     second[:, :n, :n], second[:, n:, :n] = terms.Guu - inertia, terms.Buw.swapaxes(1, 2)
     second[:, n:, n:] = terms.Gww - inertia
+    relative_shift = 0.1 + 1.0j  # of the largest squared shear wavenumber
     # The shift makes roots of slow modes accurate for any Poisson's ratio.
-    shift = SHIFT * (omega**2 * np.abs(terms.M / terms.Aww).max(axis=1))[:, None, None]
+    shift = relative_shift * (omega**2 * np.abs(terms.M / terms.Aww).max(axis=1))[:, None, None]
     inverse, vectors = np.linalg.eig(np.linalg.solve(second + shift * first, first))
     return shift[..., 0] - 1 / inverse, vectors[:, :n], vectors[:, n:]
 

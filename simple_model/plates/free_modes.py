@@ -19,8 +19,6 @@ from simple_model.layers.material import Material
 from simple_model.plates.modes import PlateModes
 from simple_model.typing import Complex, Floats
 
-CRITICAL = 1e-6  # relative distance of two poles, below which a mode is made stiffer
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeModes:
@@ -109,7 +107,8 @@ def free_vibration(stiffness: Floats, times: Floats) -> FreeModes:
     apart = np.abs(poles[:, :, None] - poles[:, None]) / np.abs(poles).max(axis=1)[:, None, None]
     apart[:, range(poles.shape[1]), range(poles.shape[1])] = np.inf
     stiffer = 1.0001
-    if (critical := apart.min(axis=(1, 2)) < CRITICAL).any():
+    closest = 1e-6  # relative distance of two poles, below which a mode is made stiffer
+    if (critical := apart.min(axis=(1, 2)) < closest).any():
         stiffness = stiffness * np.where(critical, stiffer, 1.0)[:, None]
         poles[critical] = _poles(stiffness[critical], times)
     residues = 1 / _slope(stiffness, times, poles)

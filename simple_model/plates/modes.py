@@ -34,8 +34,6 @@ from simple_model.plates.polynomials import LineBasis, line_basis, piecewise_bas
 from simple_model.typing import Bools, Complex, Floats, Ints
 
 FINEST = 350.0  # rad/m: higher wavenumbers have a third of the force of a 4.35 mm focal spot
-SHIFT = 1e-12  # of the mean squared frequency
-MOST_DOFS = 6000  # of one symmetry, for some minutes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,7 +183,7 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
     represent.
 
     `finest` may differ along x and y. The lowest modes are accurate; the highest only complete the
-    static deflection. Raises a ValueError for more than `MOST_DOFS` degrees of freedom.
+    static deflection. Raises a ValueError for more than `most_dofs` degrees of freedom.
 
     >>> stiffness = {"d11": 4e-4, "d22": 4e-4, "d12": 1.2e-4, "d66": 1.4e-4}
     >>> plate = Plate(size_x=0.1, size_y=0.1, mass_per_area=0.08, **stiffness)
@@ -194,10 +192,11 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
     """
     resolved, mirrored = np.broadcast_to(finest, 2), _symmetries(plate)
     bases = [_line_bases(plate, axis, resolved[axis], mirrored[axis]) for axis in (0, 1)]
-    if (dofs := max(x.size * y.size for x, y in product(*bases))) > MOST_DOFS:
+    most_dofs = 6000  # of one symmetry, for some minutes
+    if (dofs := max(x.size * y.size for x, y in product(*bases))) > most_dofs:
         raise ValueError(
             f"a plate of {1e3 * plate.size_x:g} by {1e3 * plate.size_y:g} mm needs {dofs:,} "
-            f"degrees of freedom, more than {MOST_DOFS:,}; lower finest = {max(resolved):g}"
+            f"degrees of freedom, more than {most_dofs:,}; lower finest = {max(resolved):g}"
         )
     return PlateModes(plate=plate, families=tuple(_family(plate, x, y) for x, y in product(*bases)))
 
@@ -450,7 +449,8 @@ def _modes(K: Floats, M: Floats) -> tuple[Floats, Floats]:
     Solves M x = K x / w^2, because the error scales with the largest eigenvalue; a shift permits
     rigid motion.
     """
-    shift = SHIFT * np.trace(K) / np.trace(M)
+    relative_shift = 1e-12  # of the mean squared frequency
+    shift = relative_shift * np.trace(K) / np.trace(M)
     inverse, shapes = linalg.eigh(M, K + shift * M, check_finite=False, overwrite_b=True)
     inverse = np.maximum(inverse[::-1], np.finfo(float).eps * inverse[-1])
     return 1 / inverse - shift, shapes[:, ::-1] / np.sqrt(inverse)

@@ -12,8 +12,6 @@ from meshes import Grading, TetMesh, graded_axis
 from skinwave.bodies.body import Body
 from skinwave.typing import Floats
 
-LOWEST_CUT_ON = 80.0  # Hz: motion of deeper slabs below it is near field at their sides
-
 
 @dataclass(frozen=True, kw_only=True)
 class AbsorbingLayer:
@@ -39,7 +37,7 @@ def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
     reflections.
 
     Dashpots alone reflect a quarter of a shear wave at 30 degrees. Lengths are multiples of the
-    depth, or of the depth whose first mode cuts on at `LOWEST_CUT_ON` if that is smaller. On a
+    depth, or of the depth whose first mode cuts on at `lowest_cut_on` if that is smaller. On a
     rigid base, waves are long near the cut-on and decay below it. A plane slab of 50 mm then
     reflects at most 1.4 % of the motion at the focus at any line, compared with 17 % for dashpots
     alone (`skinwave.verify.waves`). With a free or elastic base, bending waves propagate at all
@@ -47,7 +45,8 @@ def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
     the wavelength of the lowest material.
     """
     speed = body.solid.shear_speed
-    longest = speed / (4 * LOWEST_CUT_ON)
+    lowest_cut_on = 80.0  # Hz: motion of deeper slabs below it is near field at their sides
+    longest = speed / (4 * lowest_cut_on)
     scale = longest if body.base == "absorbing" else min(body.depth, longest)
     # Width and coarsest cell over that scale; damping over the angular frequency of cut-on.
     width, coarsest, drag, growth = {

@@ -14,9 +14,7 @@ from skinwave.bodies.build import Build, build
 from skinwave.bodies.parts import FLAT, Layer
 from skinwave.typing import Floats, Ints
 
-RIGID = 100.0  # shear modulus over that of the tissue above, from which a stratum holds it
 THINNEST = 1e-6  # m: shorter pieces of a vertical line are round-off
-FACES = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
 
 
 def flattened(body: Body, places: Floats, h: float) -> Body:
@@ -24,7 +22,7 @@ def flattened(body: Body, places: Floats, h: float) -> Body:
 
     Solids become a slab with absorbing sides. Palms and discs are everywhere as deep as in their
     middle. In bodies with regions, the strata are those on the vertical line through the first of
-    the places (n, 2) in m, in a mesh with elements of h in m. A stratum `RIGID` times as stiff as
+    the places (n, 2) in m, in a mesh with elements of h in m. A stratum `rigid` times as stiff as
     the one above it, such as bone, is the clamped base. The slab contains all places. A sheet
     keeps its sides, because the sides of a stretched sheet cannot absorb. Raises a ValueError if
     the first place is not above the body.
@@ -35,10 +33,11 @@ def flattened(body: Body, places: Floats, h: float) -> Body:
     width, height = np.maximum([body.width, body.height], 2 * np.abs(places).max(axis=0)).tolist()
     base, stiffness, depth = body.base, body.base_stiffness, body.depth
     layers, material = body.layers, body.material
+    rigid = 100.0  # shear modulus over that of the tissue above, from which a stratum holds it
     if "regions" in body.of_kind.keys:
         column = _column(body, places[0], h)
         moduli = [solid.shear_modulus + solid.fast_modulus for _, solid in column]
-        held = [k for k in range(1, len(column)) if moduli[k] > RIGID * moduli[k - 1]]
+        held = [k for k in range(1, len(column)) if moduli[k] > rigid * moduli[k - 1]]
         if held:
             column, base, stiffness = column[: held[0]], "clamped", 0.0
         depth, material = sum(thickness for thickness, _ in column), column[-1][1]
@@ -86,7 +85,8 @@ def _column(body: Body, place: Floats, h: float) -> list[tuple[float, Material]]
 def _crossed(mesh: TetMesh, place: Floats) -> tuple[Floats, Floats, Ints]:
     """Heights in m at which a vertical line enters and leaves tetrahedra, and their regions, from
     the top downwards."""
-    faces = mesh.points[mesh.tets[:, FACES]].reshape(-1, 3, 3)
+    opposite = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
+    faces = mesh.points[mesh.tets[:, opposite]].reshape(-1, 3, 3)
     heights = heights_over(faces, place).reshape(-1, 4)
     upper, lower = heights.max(axis=1), np.where(heights > -inf, heights, inf).min(axis=1)
     crossed = np.flatnonzero(upper - lower > THINNEST)

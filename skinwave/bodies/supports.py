@@ -12,8 +12,6 @@ from simple_model.choices import check_numbers, check_range, choose
 from skinwave.typing import Bools, Ints
 
 EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # axis, end
-FEWEST_COLUMNS = 3  # of nodes in a clip: fewer let the sheet turn about it
-CLIP_LINES = (0.1, 0.25, 0.5)  # of the radius of a clip: grid lines on both sides of its edges
 NEARLY = 0.01  # of the radius of a clip: lines nearer than this to another are left out
 CONDITIONS = ("clamped", "absorbing", "free")  # of a side
 DEFAULT_SIDE = "absorbing"
@@ -240,7 +238,9 @@ def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
     reach = mounting.clip_radius
     sides = [clip[axis] + turn * reach for clip in mounting.clips for turn in (-1, 1) if reach]
     placed: list[float] = []
-    for part in (0.0, *CLIP_LINES):
+    # Of the radius of a clip: grid lines on both sides of its edges.
+    relative_lines = (0.1, 0.25, 0.5)
+    for part in (0.0, *relative_lines):
         gap = (part / 2 or NEARLY) * reach
         lines = {side + turn * part * reach for side in sides for turn in (-1, 1)}
         placed += [
@@ -284,8 +284,9 @@ def supported_components(mounting: Mounting, mesh: TetMesh) -> Bools:
 
 
 def _clip_nodes(mesh: TetMesh, clip: Sequence[float], radius: float) -> Bools:
-    """Nodes (n,) in a clip: those in its square, and in the `FEWEST_COLUMNS` nearest columns."""
+    """Nodes (n,) in a clip: those in its square, and in the `fewest_columns` nearest columns."""
     away = np.abs(mesh.points[:, :2] - clip).max(axis=1)
     top = np.unique(mesh.facets["top"])
-    reach = np.partition(away[top], FEWEST_COLUMNS - 1)[FEWEST_COLUMNS - 1]
+    fewest_columns = 3  # of nodes in a clip: fewer let the sheet turn about it
+    reach = np.partition(away[top], fewest_columns - 1)[fewest_columns - 1]
     return away <= max(radius, reach) * (1 + NEARLY)

@@ -28,15 +28,6 @@ from skinwave.results.claims import TEXTS
 from skinwave.system.document import Details, Part, Picture, Section
 from skinwave.system.table import Column, Table
 
-METHOD = (
-    "Lines are fitted to each repetition by least squares. Gain and delay of each model follow "
-    "from all lines and places, weighted by noise. Their standard errors contain noise and a "
-    f"misfit beyond it; with a misfit above {percent(LARGEST_MISFIT)} there are none. A difference "
-    "is beyond the noise if its p-value, adjusted for the number of lines and "
-    f"places (Holm), is below {100 * LEVEL:g} % (Victor & Mast 1991). The point kernels are "
-    "pressures, and their gain has that unit."
-)
-
 
 def page_section(
     comparison: MeasuredComparison, picture: Callable[[str, Figure, str], Picture]
@@ -73,12 +64,20 @@ def page_section(
         f"The {MOST_LINES} strongest lines. Models have the fitted, or given, delay and gain. "
         "Filled markers: the difference in amplitude and phase is beyond the noise."
     )
+    method = (
+        "Lines are fitted to each repetition by least squares. Gain and delay of each model "
+        "follow from all lines and places, weighted by noise. Their standard errors contain "
+        f"noise and a misfit beyond it; with a misfit above {percent(LARGEST_MISFIT)} there are "
+        "none. A difference is beyond the noise if its p-value, adjusted for the number of lines "
+        f"and places (Holm), is below {100 * LEVEL:g} % (Victor & Mast 1991). The point kernels "
+        "are pressures, and their gain has that unit."
+    )
     return Section("Comparison with the measurement", [
         *(conclusion(comparison, column) for column in comparison.bodies),
         *remarks(comparison),
         picture("measured", figure, caption),
         columns_table(comparison),
-        METHOD,
+        method,
         Details(f"Largest differences of the {label(main.run.column)}, line by line",
                 [differences]),
         Section("Claims of the paper, assessed on the measurement", claims, 3),

@@ -23,13 +23,8 @@ from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import noise_floor
 from skinwave.typing import Floats
 
-TURN_ERRORS = 2.0  # standard errors of a frequency, whose turn of phase is ignored
-
 MAINS = (50.0, 60.0)  # Hz
 MAINS_WANDER = 0.004  # of its frequency
-STRONG = 1e-2  # of the strongest line of the load, for which hum may be mistaken
-
-BAND = 0.005  # of the half range, next to the extreme
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,7 +114,7 @@ def unsteady(
     """Return a sentence, without a full stop, if a line of waveforms changes between both halves.
 
     The change must exceed the noise, the share `least`, and what a phase error explains:
-    `TURN_ERRORS` times the errors (f,) in Hz of its frequency.
+    `turn_errors` times the errors (f,) in Hz of its frequency.
     """
     count = len(measured.times)
     half = int((1 - SETTLE) * count) // 2
@@ -140,7 +135,8 @@ def unsteady(
     turn = np.pi * (1 - SETTLE) * count / measured.rate * errors
     unsteady_chance = 0.01  # that a steady motion is called unsteady
     is_sure = (holm(both.p_values(change)) < unsteady_chance).any(axis=1)
-    beyond = np.flatnonzero(is_sure & (share > np.maximum(TURN_ERRORS * turn, least)))
+    turn_errors = 2.0  # standard errors of a frequency, whose turn of phase is ignored
+    beyond = np.flatnonzero(is_sure & (share > np.maximum(turn_errors * turn, least)))
     if not len(beyond):
         return []
     k = beyond[(share * size)[beyond].argmax()]
@@ -249,7 +245,8 @@ def _cut_off(x: Floats) -> int:
     long_run = 20  # or one run
     if (lengths >= run).sum() < fewest_runs and lengths.max() < long_run:
         return 0
-    band = min(top - BAND * np.ptp(x) / 2, x[x < top].max())
+    relative_band = 0.005  # of the half range, next to the extreme
+    band = min(top - relative_band * np.ptp(x) / 2, x[x < top].max())
     count, below = int(at_top.sum()), int(((x < top) & (x >= band)).sum())
     excess = 6.0  # times the samples in the band; a rounded sinusoid has at most 2.4
     return count if count > excess * below else 0
@@ -272,7 +269,8 @@ def flaws(measured: Measurement, pressure: MovingPressure) -> list[str]:
 def _hum(measured: Measurement, pressure: MovingPressure) -> list[str]:
     """Return sentences on lines of the load that coincide with a multiple of mains hum."""
     load = line_names(pressure)
-    strong = load.strengths >= STRONG * load.strengths.max(initial=0.0)
+    strong_ratio = 1e-2  # of the strongest line of the load, for which hum may be mistaken
+    strong = load.strengths >= strong_ratio * load.strengths.max(initial=0.0)
     f, names = load.frequencies[strong], np.array(load.names)[strong]
     apart = 1 / float(np.ptp(measured.times))
 

@@ -26,12 +26,6 @@ COLUMNS = (
     "unit", Column("false_alarm", "false alarm", digits=1), Column("what", "origin"),
 )  # fmt: skip
 NO_LINES = "No line rises above the noise floor."
-METHOD = (
-    "The false alarm is the probability that noise alone has any line as high in the whole file. "
-    "The standard error of a frequency is the Cramér-Rao bound in the surrounding noise, for a "
-    "steady motion. The origin is mains for 50 or 60 Hz and their multiples, and drive if the "
-    "recorded drive has the line."
-)
 
 
 def write(folder: Path, inspection: Inspection) -> None:
@@ -48,11 +42,17 @@ def write(folder: Path, inspection: Inspection) -> None:
         "window, or magnitudes; dashed: noise floor without the lines; triangles: lines, grey for "
         "mains hum. Map: root mean square about the mean."
     )
+    method = (
+        "The false alarm is the probability that noise alone has any line as high in the whole "
+        "file. The standard error of a frequency is the Cramér-Rao bound in the surrounding "
+        "noise, for a steady motion. The origin is mains for 50 or 60 Hz and their multiples, and "
+        "drive if the recorded drive has the line."
+    )
     Report(
         f"Inspection of {measured.name}", verdict=[" ".join(sentences(inspection))],
         parts=[
             Picture(png(figure(inspection)), caption, "measured"),
-            Section("Lines", [largest(inspection), METHOD] if inspection.lines else [NO_LINES]),
+            Section("Lines", [largest(inspection), method] if inspection.lines else [NO_LINES]),
             Section("Missing or assumed", missing),
         ],
     ).write(folder)  # fmt: skip

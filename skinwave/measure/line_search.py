@@ -22,7 +22,6 @@ ALARM = 0.01  # probability that a file of noise has any line
 LOWEST = 4  # bins; slower motion is drift, and lines as close to half the rate are undetermined
 FEWEST = 32  # samples
 MOST_LINES = 40
-LARGEST_STEP = 0.5  # bins
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -176,10 +175,11 @@ def _fit_lines(x: Floats, start: Floats, rate: float, floor: Floats, runs: int) 
     """Return lines fitted together to waveforms (t, r p), weighted by the noise floor (f, p), from
     frequencies (l,) in Hz with an error of a fraction of a bin.
     """
-    frequencies, limit = start.copy(), LARGEST_STEP * rate / len(x)
+    largest_step = 0.5  # bins
+    frequencies, limit = start.copy(), largest_step * rate / len(x)
     noise = np.tile(floor[_bins(start, x, floor, rate)], (1, runs))
     most_steps = 12  # of Gauss-Newton
-    last_step = 0.01  # of a standard error or of `LARGEST_STEP`
+    last_step = 0.01  # of a standard error or of `largest_step`
     for _ in range(most_steps):
         step, errors, linear, rest = _step(x, frequencies, rate, noise)
         if (np.abs(step) < last_step * np.minimum(errors, limit)).all():

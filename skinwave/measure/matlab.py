@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-HDF5 = b"\x89HDF\r\n\x1a\n"
 DAMAGED = "the file is damaged, too large or not a MATLAB file; save fewer arrays again with -v7"
 
 
@@ -19,13 +18,14 @@ class Unreadable(ValueError):
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """Return the arrays in a file by name, those of structures as "structure.field"."""
     warnings.simplefilter("ignore")  # of duplicate names
-    header = 512  # bytes before HDF5 in a file of version 7.3
+    header = 512  # bytes before hdf5 in a file of version 7.3
+    hdf5 = b"\x89HDF\r\n\x1a\n"
     with path.open("rb") as file:
-        head = file.read(header + len(HDF5))
+        head = file.read(header + len(hdf5))
     arrays: dict[str, np.ndarray] = {}
     missing = 'MATLAB 7.3 files need h5py; pip install "skinwave[measure]", or save with -v7'
     try:
-        for name, value in (_hdf5 if HDF5 in head else _mat)(path).items():
+        for name, value in (_hdf5 if hdf5 in head else _mat)(path).items():
             _add(arrays, name, value, 0)
     except ImportError:
         raise ValueError(missing) from None

@@ -26,7 +26,6 @@ from skinwave.measure.predicted import (
 from skinwave.typing import Complex, Floats
 
 KINDS = ("waveforms", "lines", "amplitudes")
-WEAK = 0.05  # of the load's strongest line; weaker unresolved lines are left out
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +123,8 @@ def load_lines(measured: Measurement, aim: Target) -> LoadLines:
     lines, names = lines_of(measured, np.array(list(kept.values()))), np.array(list(kept))
     predicted = aim.predicts(lines.frequencies)
     strengths = dict(zip(load.names, load.strengths.tolist(), strict=True))
-    least = WEAK * float(load.strengths.max(initial=0.0))
+    weak_ratio = 0.05  # of the load's strongest line; weaker unresolved lines are left out
+    least = weak_ratio * float(load.strengths.max(initial=0.0))
     strong = tuple(name for name in lost if strengths.get(name, 0.0) > least)
     weak = (LeftOutLine(name=name, frequency=f, share=np.nan)
             for name, f in lost.items() if name not in strong)  # fmt: skip

@@ -43,7 +43,6 @@ from skinwave.typing import Complex, Floats
 
 Predict = Callable[[Values], np.ndarray]
 SAME_LINE = 1e-3  # of a frequency
-CACHED = 32  # predictions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +163,7 @@ def predicted_waveforms(aim: Target, times: Floats) -> Predict:
 
 
 def _from_cache(function: Callable[[Values], Any]) -> Callable[[Values], Any]:
-    @lru_cache(maxsize=CACHED)
+    @lru_cache(maxsize=32)
     def of_items(items: tuple[tuple[str, float], ...]) -> Any:
         return function(dict(items))
 

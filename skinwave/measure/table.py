@@ -18,7 +18,6 @@ from skinwave.typing import Floats
 
 EXAMPLE = "t [s], v(0,0) [mm/s], v(5,0) [mm/s]"
 LONG_EXAMPLE = "t [s], x [mm], y [mm], v [mm/s]"
-SIGNS = {"into the body": 1, "out of the body": -1}
 # Keys of notes, in lower case.
 _RATE = re.compile(r"sampl\w*[ _-]*(rate|freq\w*)|abtast(rate|frequenz)|fs|rate")
 _INTERVAL = re.compile(
@@ -102,7 +101,8 @@ def recording_of(table: Table, given: Given) -> Recording:
         values, places = _by_repetition(series)
     notes = {key: value for key, value in reversed(table.notes) if value}
     remarks = [value for key, value in table.notes if key == "remark" and value] + remarks
-    sign = SIGNS.get(notes.get("positive", ""), 0) or _sign([columns[k] for k in motion], given)
+    signs = {"into the body": 1, "out of the body": -1}
+    sign = signs.get(notes.get("positive", ""), 0) or _sign([columns[k] for k in motion], given)
     return Recording(
         values=values, times=times, frequencies=frequencies, quantity=quantity, unit=unit,
         places=places, drive=drive, sign=sign, name=notes.get("name", ""),

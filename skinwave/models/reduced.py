@@ -49,13 +49,11 @@ from skinwave.scene.scene import SURFACE, Body, Reading, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 from skinwave.typing import Bools, Floats
 
-REDUCTION_TOLERANCE = 4e-3  # at most
-FORMAT = "reduced 13"  # of a cached body
-
 
 def reduction_tolerance(tolerance: float, share: float = 1 / 15) -> float:
     """Return the tolerance of a reduction, a small share of the waveform's."""
-    return min(REDUCTION_TOLERANCE, share * tolerance)
+    largest = 4e-3  # at most
+    return min(largest, share * tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -201,8 +199,9 @@ def entry_name(
     # Of the support motion a reduced body depends on the direction alone.
     direction = load.support_motion.unit if load.support_motion else ()
     read = () if outputs is None else (outputs.data, outputs.indices, outputs.indptr)
+    version = "reduced 13"  # of a cached body
     return cache.key(
-        FORMAT, *Effort.__dataclass_fields__, body, mesh.points, mesh.tets, mesh.region, *facets,
+        version, *Effort.__dataclass_fields__, body, mesh.points, mesh.tets, mesh.region, *facets,
         build.material, build.symmetry, build.fixed, build.absorbing, build.coat, build.drag,
         build.held, build.tension, *support, probes, band, tolerance, solver_name(solver),
         versions(), *read, replace(load, support_motion=None), direction, path,

@@ -17,13 +17,8 @@ from skinwave.bodies.supports import EDGES
 from skinwave.scene.scene import SAMPLE_RATE, Body, Scene
 from skinwave.typing import Complex, Floats
 
-# Reflections of the four sides may be in phase; slabs reflected 0.5 to 0.9 times as much. Where
-# viscosity dominates, a free side reflects more than its image source: overdamped slabs of 80 to
-# 120 mm reflected 0.9 to 1.1 times the estimate with both factors, of 70 mm up to 1.5 times.
-IN_PHASE, OVERDAMPED = 2.0, 1.5
 NO_BOUND = 2.0  # difference of two waveforms over the larger one, which it never exceeds
 FAR = 0.25  # m, beyond which waves are neglected
-DURATION = 0.1  # s of the estimate of reflections
 
 
 def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
@@ -82,8 +77,8 @@ def side_reflections(scene: Scene) -> float:
     body, at most `NO_BOUND`, which also stands for unknown reflections.
 
     The reflection of a side at a probe is the motion of an infinite body at the mirror image of the
-    probe. The estimate is the root of the four energies times `IN_PHASE`, because reflections may
-    be in phase, and times up to `OVERDAMPED` where shear waves cannot oscillate. Absorbing sides do
+    probe. The estimate is the root of the four energies times `in_phase`, because reflections may
+    be in phase, and times up to `overdamped` where shear waves cannot oscillate. Absorbing sides do
     not reflect, and a half-space has no sides.
     """
     body, probes = scene.body, scene.probe_points
@@ -94,7 +89,8 @@ def side_reflections(scene: Scene) -> float:
     is_estimated = scene.load.is_normal
     if not is_estimated or _to_edge(scene, half) < 2 * spot_scale(scene.pressure):
         return NO_BOUND
-    duration = min(scene.tacton.duration, DURATION)
+    estimated_duration = 0.1  # s of the estimate of reflections
+    duration = min(scene.tacton.duration, estimated_duration)
     times = np.arange(max(2, round(duration * SAMPLE_RATE))) / SAMPLE_RATE
     points = np.vstack([probes, *images])
     # Other quantities reflect about as the displacement of the surface does.
@@ -104,7 +100,11 @@ def side_reflections(scene: Scene) -> float:
     own, *reflected = (u**2).mean(axis=0).reshape(-1, len(probes))
     ratio = float(np.sqrt((sum(reflected) / np.maximum(own, 1e-300)).max()))
     critical = min(1.0, _loss_at_cut_off(body) / 2)
-    ratio *= IN_PHASE * (1 + (OVERDAMPED - 1) * critical)
+    # Reflections of the four sides may be in phase; slabs reflected 0.5 to 0.9 times as much. Where
+    # viscosity dominates, a free side reflects more than its image source: overdamped slabs of 80
+    # to 120 mm reflected 0.9 to 1.1 times the estimate with both factors, of 70 mm up to 1.5 times.
+    in_phase, overdamped = 2.0, 1.5
+    ratio *= in_phase * (1 + (overdamped - 1) * critical)
     unclamped = 2.0  # factor for a base that is not clamped: small plates had up to 2.3
     if body.base != "clamped":
         # Waves of all frequencies travel from side to side and bend the body as a whole.

@@ -27,8 +27,6 @@ from skinwave.planning.refinement import about_its_rest, element_sizes
 from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Floats
 
-WIDER = 2.0  # times the width of the layer
-
 
 def symmetry(scene: Scene) -> str:
     """Return the axes across whose middle planes body and load are symmetric at all times."""
@@ -57,8 +55,10 @@ def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -
         )  # fmt: skip
         return about_its_rest(scene, answer(prepared, scene).values)
 
+    times_wider = 2.0  # times the width of the layer
+
     def change(reduction: float) -> float:
-        usual, wide = waveforms(1.0, reduction), waveforms(WIDER, reduction)
+        usual, wide = waveforms(1.0, reduction), waveforms(times_wider, reduction)
         return float(relative_changes(wide - usual, wide).max())
 
     # Error over change: slabs on springs, free ones and half-spaces had 1.0 to 1.3.

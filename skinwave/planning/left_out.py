@@ -46,11 +46,7 @@ from skinwave.typing import Floats
 
 EXACT = SolveOptions(tolerance=1e-3)  # of the models that are compared
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet may be taken as linear
-# Relative change of natural frequencies over (w / h)^2, under a mean deflection w: 0.7 of a clamped
-# plate, 2.6 of a simply supported one.
-HARDENING = 2.6
 NEGLIGIBLE = 0.1  # of the tolerance, of an error that is bounded rather than measured
-SHIFT = 1e-3  # of natural frequencies, for the sensitivity
 
 
 def start_error(
@@ -170,7 +166,7 @@ def stretching_error(scene: Scene, model: Model, tolerance: float) -> float:
 
 def _stretching_bound(scene: Scene, negligible: float) -> float:
     """Return a bound of the relative error of linear bending at small deflection, no sharper than
-    to decide whether it is negligible: stretching raises natural frequencies by at most `HARDENING`
+    to decide whether it is negligible: stretching raises natural frequencies by at most `hardening`
     (w / h)^2, and a resonance multiplies this.
     """
     squared, plain = linear_deflection(scene) ** 2, _displacement_scene(scene)
@@ -180,7 +176,10 @@ def _stretching_bound(scene: Scene, negligible: float) -> float:
     bound = steepest * squared
     if not squared or bound > negligible or not takes(FROM_REST, plain):
         return bound
-    return max(bound, HARDENING * plate_modes.sensitivity(plain) * squared)
+    # Relative change of natural frequencies over (w / h)^2, under a mean deflection w: 0.7 of a
+    # clamped plate, 2.6 of a simply supported one.
+    hardening = 2.6
+    return max(bound, hardening * plate_modes.sensitivity(plain) * squared)
 
 
 def stretches(scene: Scene, tolerance: float) -> float:
@@ -262,8 +261,11 @@ def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> tuple[floa
     whole = waveforms(0.0)
     moving = whole - whole.mean(axis=0)
     speed = float(np.linalg.norm(np.diff(moving, axis=0))) * RATE
-    change = float(relative_changes(waveforms(SHIFT) - whole, whole).max())
-    return change / SHIFT, speed / max(float(np.linalg.norm(moving)), 1e-300) / (2 * np.pi)
+    frequency_shift = 1e-3  # of natural frequencies, for the sensitivity
+    change = float(relative_changes(waveforms(frequency_shift) - whole, whole).max())
+    return change / frequency_shift, speed / max(float(np.linalg.norm(moving)), 1e-300) / (
+        2 * np.pi
+    )
 
 
 def series_error(

@@ -27,9 +27,6 @@ from skinwave.system.effort import Progress, silent
 from skinwave.system.processes import beside
 from skinwave.typing import Array, Floats
 
-# Ratio of the sizes of two meshes that are compared, because closer ones differ more by chance:
-# above the default size, and up to it, where cells far from the focus are as large in both.
-APART = 1.6, 2.0
 # Ratio of their cells along an axis; and of successive sizes of a refinement, at least.
 STEP = 1.3
 # Of the default element size: the coarsest mesh of bodies whose elements follow their layers, and
@@ -169,7 +166,10 @@ def first_size(scene: Scene, sizes: Floats, tolerance: float) -> float:
 
 def apart(body: Body, h: float) -> float:
     """Return the ratio of the size of elements to compare with to h in m."""
-    return APART[1] if h <= default_size(body) * (1 + 1e-9) else APART[0]
+    # Ratio of the sizes of two meshes that are compared, because closer ones differ more by chance:
+    # above the default size, and up to it, where cells far from the focus are as large in both.
+    both_apart = 1.6, 2.0
+    return both_apart[1] if h <= default_size(body) * (1 + 1e-9) else both_apart[0]
 
 
 def nearest_size(sizes: Floats, wanted: float) -> float:

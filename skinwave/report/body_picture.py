@@ -31,7 +31,6 @@ from skinwave.scene.scene import Scene
 from skinwave.system.effort import Clock, silent
 from skinwave.typing import Array, Floats, Ints
 
-WIDTH = 7.0  # inch: of the picture, and of a row of its legend
 FREE, CLAMPED, SIMPLE, SPRINGS, ABSORBING = (
     "free", "clamped", "simply supported", "on springs", "absorbing"
 )  # fmt: skip
@@ -40,13 +39,7 @@ BOUNDARY = {
     ABSORBING: "#7db8dc",
 }  # fmt: skip
 REGIONS = ("#e8a48c", "#f3d7a2", "#c9705f", "#f6f1e0", "#b88fa8", "#a9a05f", "#d9c2d0")
-# Lengths over the largest side of the body: the arrow to the device, the gap below it, and the
-# thickness of the support that is drawn below the body.
-ARROW = 0.16
-FRONT, SECTION = 0.05, 241  # mm, of thin layers before a section; points along it
-SCALE = 2  # of lines and balls, which are drawn smaller
 FAR = 1e4  # mm, outside all bodies
-LIT: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.6}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -164,12 +157,13 @@ def body_picture(scene: Scene, style: Style = REPORT) -> render.Image:
     """
     drawn = meshed_body(scene.body)
     height, row = 3.6, 0.24  # inch: of the picture, and of a row of its legend
-    inch = style.size(WIDTH, height)[0] if style.columns else WIDTH
+    page_width = 7.0  # inch: of the picture, and of a row of its legend
+    inch = style.size(page_width, height)[0] if style.columns else page_width
     width = render.pixels(style, inch)
-    image = _render(drawn, scene, style, (width, round(width * height / WIDTH)), inch)
+    image = _render(drawn, scene, style, (width, round(width * height / page_width)), inch)
     entries = _entries(drawn, scene)
     most_columns, narrow_columns = 4, 2  # of the legend
-    columns = most_columns if inch > WIDTH / 2 + 1 else narrow_columns
+    columns = most_columns if inch > page_width / 2 + 1 else narrow_columns
     with mpl.rc_context({**style.rc, "font.size": render.LETTERS}):
         figure = Figure(figsize=(inch, row * (-(-len(entries) // columns) + 1)))
         legend(figure, entries, columns, loc="center", fontsize=None, frameon=False)
@@ -203,12 +197,17 @@ def _render(
     top = (below if len(below) else drawn.points)[:, 2].max()
     gap, plate = 0.05, 0.02
     foot = np.array([*drawn.corner, top + gap * side])
-    tip = foot + [0.0, 0.0, ARROW * side]
+    # Lengths over the largest side of the body: the arrow to the device, the gap below it, and the
+    # thickness of the support that is drawn below the body.
+    arrow_size = 0.16
+    tip = foot + [0.0, 0.0, arrow_size * side]
     camera = (0.55, -1.0, 0.7)  # direction to the camera
     edge = "#5a5f66"  # colour of the edges of elements
     steep = -0.7  # vertical component of the normal of a base, at most
+    enlargement = 2  # of lines and balls, which are drawn smaller
+    lit: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.6}
     with render.new_plotter(style, size) as plotter:
-        plotter.enable_anti_aliasing("ssaa")  # draws at `SCALE` times the size
+        plotter.enable_anti_aliasing("ssaa")  # draws at `enlargement` times the size
         skin = pv.PolyData.from_regular_faces(drawn.points, split(drawn.facets))
         shades = np.array([to_rgb(BOUNDARY[name]) for name in drawn.conditions])
         free = np.array(to_rgb(BOUNDARY[FREE]))
@@ -216,7 +215,7 @@ def _render(
         skin = _opened(skin, drawn).extract_surface(algorithm="dataset_surface")
         skin = skin.compute_normals(feature_angle=render.SHARP, split_vertices=True)
         skin = skin.cell_data_to_point_data()  # colours change abruptly at sharp edges only
-        plotter.add_mesh(skin, scalars="shade", rgb=True, smooth_shading=True, **LIT)
+        plotter.add_mesh(skin, scalars="shade", rgb=True, smooth_shading=True, **lit)
         edges = _opened(_edges(drawn, drawn.facets), drawn)
         plotter.add_mesh(edges, color=edge, opacity=0.2, line_width=letter / 12)
         for name in set(drawn.conditions) - {FREE}:
@@ -230,7 +229,7 @@ def _render(
                 mark = _opened(mark.extrude((0.0, 0.0, -plate * side), capping=True), drawn)
             else:
                 continue
-            plotter.add_mesh(mark, color=BOUNDARY[name], line_width=letter / 3, **LIT)
+            plotter.add_mesh(mark, color=BOUNDARY[name], line_width=letter / 3, **lit)
         if drawn.is_cut:
             _add_sections(plotter, drawn)
         lift = [0.0, 0.0, render.LIFT * side]
@@ -239,11 +238,11 @@ def _render(
         )
         marks = [pv.lines_from_points(path)] if len(path) > 1 else []
         marks += [pv.PolyData(probes)] if len(probes) else []
-        render.add_marks(plotter, marks, pv.PolyData(path[:1] + lift), SCALE * letter)
+        render.add_marks(plotter, marks, pv.PolyData(path[:1] + lift), enlargement * letter)
         arrow = pv.Arrow(
             start=foot, direction=tip - foot, scale="auto", shaft_radius=0.03, tip_radius=0.09
         )
-        plotter.add_mesh(arrow, color=ORANGE, **LIT)
+        plotter.add_mesh(arrow, color=ORANGE, **lit)
         render.add_label(plotter, "    to the device, +z", (foot + 3 * tip) / 4, letter, style.ink)
         render.add_scale_bar(plotter, drawn.points, style, letter)
         name, words = label(body_name(scene.body)), scene.body.of_kind.words(scene.body)
@@ -279,15 +278,16 @@ def _add_sections(plotter: Any, drawn: MeshedBody) -> None:
     shades = np.array([to_rgb(drawn.colours[drawn.names[k]]) for k in regions.tolist()])
     body["shade"] = (255 * shades[index]).astype(np.uint8)
     x, y = drawn.corner
+    in_front, section_points = 0.05, 241  # mm, of thin layers before a section; points along it
     # Normal of each section, the box it lies in, the place where it ends, and its front.
     for normal, box, end, front in (
-        ("y", (x, FAR, -FAR, FAR), (drawn.points[:, 0].max(), y), (0.0, -FRONT, 0.0)),
-        ("x", (-FAR, FAR, -FAR, y), (x, drawn.points[:, 1].min()), (FRONT, 0.0, 0.0)),
+        ("y", (x, FAR, -FAR, FAR), (drawn.points[:, 0].max(), y), (0.0, -in_front, 0.0)),
+        ("x", (-FAR, FAR, -FAR, y), (x, drawn.points[:, 1].min()), (in_front, 0.0, 0.0)),
     ):
         section = body.slice(normal=normal, origin=(x, y, 0.0))
         section = section.clip_box((*box, -FAR, FAR), invert=False)
         plotter.add_mesh(section, scalars="shade", rgb=True, lighting=False)
-        along = drawn.on_top(np.linspace(drawn.corner, end, SECTION)) + front
+        along = drawn.on_top(np.linspace(drawn.corner, end, section_points)) + front
         for name, thickness in drawn.coat:
             layer = pv.lines_from_points(along).extrude((0.0, 0.0, -thickness), capping=False)
             plotter.add_mesh(layer, color=drawn.colours[name], lighting=False)

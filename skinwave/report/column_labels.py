@@ -7,21 +7,21 @@ UNITS = {  # by the end of a column's name
     "_pa": "Pa", "_ms": "ms", "_s": "s", "_percent": "%", "_deg": "°", "_gib": "GiB", "_cm2": "cm²",
     "_kg_m3": "kg/m³", "_pa_s": "Pa s", "seconds": "s", "_ratio": "µm/Pa, scaled",
 }  # fmt: skip
-NAMES = {
-    "peak_um": "largest displacement", "rms_um": "RMS displacement about its mean",
-    "level_db": "sensation level", "tacton.speed_m_per_s": "drawing speed",
-    "tacton.am_frequency_hz": "AM frequency", "tacton.size_mm": "size of the path",
-    "body.thickness_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
-    "spread_20db_mm": "spread to -20 dB", "kernel_misfit": "misfit to the point kernel",
-    "kernel_delay_ms": "delay behind the point kernel",
-    "expected_error": "expected error", "above_threshold_cm2": "area above threshold",
-}  # fmt: skip
 
 
 def axis_label(column: str) -> str:
     """Return the label of an axis: the quantity of a column and its unit."""
     name, probe = at_probe(column)
-    words = NAMES.get(name)
+    names = {
+        "peak_um": "largest displacement", "rms_um": "RMS displacement about its mean",
+        "level_db": "sensation level", "tacton.speed_m_per_s": "drawing speed",
+        "tacton.am_frequency_hz": "AM frequency", "tacton.size_mm": "size of the path",
+        "body.thickness_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
+        "spread_20db_mm": "spread to -20 dB", "kernel_misfit": "misfit to the point kernel",
+        "kernel_delay_ms": "delay behind the point kernel",
+        "expected_error": "expected error", "above_threshold_cm2": "area above threshold",
+    }  # fmt: skip
+    words = names.get(name)
     if words is None:
         words = name.split(".", 1)[-1] if re.match(r"[a-z]+\.[a-z]", name) else name
         for end in UNITS:

@@ -14,7 +14,6 @@ from skinwave.report.figures import LINE_STYLE, REPORT, legend, name_lines, with
 from skinwave.report.palette import SERIES
 from skinwave.report.styles import Style
 
-FINE = 600  # frequencies of a drawn curve
 PALE = 0.35  # opacity of evanescent modes
 
 
@@ -75,8 +74,9 @@ def _draw_curves(axes: Sequence[Axes], curves: DispersionCurves, focus_speed: fl
     """Draw speed, length and group speed of each mode; evanescent parts are pale."""
     speeds, groups, longest = [focus_speed], [1.0], 10.0
     drawn = []
+    fine_count = 600  # frequencies of a drawn curve
     for n, mode in enumerate(curves.modes):
-        fine = np.linspace(mode.frequencies[0], mode.frequencies[-1], FINE)
+        fine = np.linspace(mode.frequencies[0], mode.frequencies[-1], fine_count)
         nearest = np.abs(fine[:, None] - mode.frequencies).argmin(axis=1)
         wave = mode.is_wave[nearest] & (fine >= mode.cut_on)
         wavenumber = np.sqrt(mode.squared_at(fine))

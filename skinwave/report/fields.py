@@ -51,8 +51,6 @@ if TYPE_CHECKING:
     import pyvista as pv
     from matplotlib.axes import Axes
 
-SLACK = 0.5  # sampling intervals by which a time may lie outside those of a field
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Field:
@@ -114,7 +112,8 @@ class Field:
         times = self.times
         if time is None:
             return int(np.argmax((self.displacement**2).sum(axis=2).max(axis=1)))
-        slack = SLACK * float(times[1] - times[0]) if len(times) > 1 else 0.0
+        most_slack = 0.5  # sampling intervals by which a time may lie outside those of a field
+        slack = most_slack * float(times[1] - times[0]) if len(times) > 1 else 0.0
         if not times[0] - slack <= time <= times[-1] + slack:
             raise ValueError(
                 f"time = {time:g} s is outside the times of the field, {times[0]:g} to "

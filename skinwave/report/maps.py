@@ -24,8 +24,6 @@ from skinwave.scene.scene import Scene
 from skinwave.typing import Floats, Ints
 
 PIXELS = 201  # along a side of a snapshot
-ALONE = 5.0  # inch: of a snapshot, of a map with its bar, of one map
-KERNEL = "#ff9e4a"  # lines: the kernel's -20 dB, the detection threshold
 MEASURED_EDGE = COLOURS["measured"]
 CAPTION = (
     "Outside the dashed line the point kernel is below a tenth of its largest value; the body "
@@ -75,10 +73,12 @@ def surfaces_figure(
     kernel = next((each for each in surfaces.values() if each.quantity is PRESSURE), None)
     alone = len(surfaces) == 1
     side = 3.85  # inch: of a snapshot, of a map with its bar, of one map
-    figure, axes = panels(len(surfaces), style, ALONE if alone else side)
+    alone_size = 5.0  # inch: of a snapshot, of a map with its bar, of one map
+    figure, axes = panels(len(surfaces), style, alone_size if alone else side)
     entries: dict[str, Any] = _path_entry(scene, "white")
     threshold = "#ff2fd0"  # lines: the kernel's -20 dB, the detection threshold
     raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+    kernel_colour = "#ff9e4a"  # lines: the kernel's -20 dB, the detection threshold
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
         quantity, power = surface.quantity, _power_of_ten(surface.unit_rms)
         shown = np.maximum(_finer(surface.unit_rms), 0.0) / 10.0**power
@@ -91,7 +91,9 @@ def surfaces_figure(
         ax.set(xlim=(left, right), ylim=(low, high))
         borders = [(surface, NEAR, "white", "solid", f"{NEAR:g} dB")]
         if kernel is not None:
-            borders.insert(0, (kernel, OUTSIDE, KERNEL, "dashed", f"kernel's {OUTSIDE:g} dB"))
+            borders.insert(
+                0, (kernel, OUTSIDE, kernel_colour, "dashed", f"kernel's {OUTSIDE:g} dB")
+            )
         for field, drop, colour, dashes, name in borders:
             level = np.nanmax(field.rms) * 10 ** (drop / 20)
             if _draw_border(ax, field, field.rms, level, colour, dashes):

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from skinwave.results.comparison import Agreement
     from skinwave.scene.scene import Scene
 
-BODY, PATH = "#e8d5c4", "#222222"
-NARROW = 0.5  # inch per point of font size: a narrower legend has one column
-
 
 def _line(kind: str, parts: Iterable[str]) -> str:
     return f"<{kind}: {'; '.join(parts)}>"
@@ -137,9 +134,10 @@ def draw_scene(scene: "Scene", ax: "Axes | None") -> "Axes":
     """Draw body, path, foci at the start and probes from above, in mm."""
     ax, path = drawing.new_axes(ax), scene.tacton.trajectory
     _draw_body(ax, scene.body)
+    path_colour = "#222222"
     if not path.is_static:
         x, y = 1e3 * path.at_phase(np.linspace(0, 1, 721)).T
-        ax.plot(x, y, color=PATH, lw=1.2, ls="dotted", label="path")
+        ax.plot(x, y, color=path_colour, lw=1.2, ls="dotted", label="path")
     _draw_foci(ax, scene)
     x, y = 1e3 * scene.probe_points.T
     probe = "#0072B2"
@@ -148,7 +146,8 @@ def draw_scene(scene: "Scene", ax: "Axes | None") -> "Axes":
     for k in range(min(len(x), most_numbered)):
         ax.annotate(str(k), (x[k], y[k]), xytext=(3, 3), textcoords="offset points", color=probe,
                     fontsize=drawing.small())  # fmt: skip
-    narrow = ax.figure.get_figwidth() < NARROW * drawing.small()  # type: ignore[union-attr]
+    narrowest = 0.5  # inch per point of font size: a narrower legend has one column
+    narrow = ax.figure.get_figwidth() < narrowest * drawing.small()  # type: ignore[union-attr]
     compact = {"borderaxespad": 0.2, "handlelength": 1.5, "columnspacing": 1.0}
     _finish(ax, {"ncols": 1 if narrow else 2, **compact})
     return ax
@@ -172,16 +171,20 @@ def _draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
         return
     width, height = 1e3 * body.width, 1e3 * body.height
     radius = 1e3 * body.palm.corner_radius if "relief" in body.of_kind.keys else 0.0
+    body_colour = "#e8d5c4"
     outline = FancyBboxPatch(
         (-width / 2, -height / 2), width, height,
         f"round,pad=0,rounding_size={radius}" if radius else "square,pad=0",
-        facecolor="none" if symmetry else BODY, edgecolor="0.4", label=body.of_kind.words(body),
+        facecolor="none" if symmetry else body_colour, edgecolor="0.4",
+        label=body.of_kind.words(body),
     )  # fmt: skip
     ax.add_patch(outline)
     if symmetry:
         left, bottom = (0.0 if a in symmetry else -size / 2
                         for a, size in (("x", width), ("y", height)))  # fmt: skip
-        part = Rectangle((left, bottom), width / 2 - left, height / 2 - bottom, facecolor=BODY)
+        part = Rectangle(
+            (left, bottom), width / 2 - left, height / 2 - bottom, facecolor=body_colour
+        )
         part.set_label("modelled part")
         ax.add_patch(part)
         part.set_clip_path(outline)

@@ -20,13 +20,6 @@ COLOURS = {
     "palm": GREEN,
     "measured": "#CC79A7",
 }
-DASHES: dict[str, Any] = {"paper-sheet": (0, (5, 1))}  # of waveforms, for print in grey
-LABELS = {
-    **{model.name: model.label for model in (SAME_LOAD, PUBLISHED)},
-    "paper-sheet": "paper sheet",
-    "paper-sheet-loose": "loose sheet",
-    "skin-slab": "skin slab",
-}
 SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # colour maps of quantities with and without a sign
 
 
@@ -54,9 +47,16 @@ def line_style(column: str) -> dict[str, Any]:
 
 def dashes(column: str) -> Any:
     """Return the dashes of the waveform of a `Run.column`."""
-    return DASHES.get(column, "solid")
+    by_name: dict[str, Any] = {"paper-sheet": (0, (5, 1))}  # of waveforms, for print in grey
+    return by_name.get(column, "solid")
 
 
 def label(column: str) -> str:
     """Return the name of a `Run.column` in legends and tables."""
-    return LABELS.get(column, column)
+    by_name = {
+        **{model.name: model.label for model in (SAME_LOAD, PUBLISHED)},
+        "paper-sheet": "paper sheet",
+        "paper-sheet-loose": "loose sheet",
+        "skin-slab": "skin slab",
+    }
+    return by_name.get(column, column)

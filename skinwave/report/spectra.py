@@ -27,11 +27,6 @@ from skinwave.report.styles import NARROW, SHOWN, Style
 from skinwave.results.run import Run
 from skinwave.typing import Floats
 
-# Titles of the columns of a Tacton's figure, in one line and in two.
-TITLES = (
-    "waveform about its mean, over the model's largest",
-    "spectrum, dB re the model's largest line",
-)
 FLOOR = -80.0  # dB
 HIGHEST_SHOWN = 650.0  # Hz
 CURVE: dict[str, Any] = {"color": "0.45", "lw": 1.5}
@@ -58,7 +53,12 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
         _draw_spectra(axes[p, 1], runs, p)
         axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
     short_titles = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
-    titles = short_titles if narrow else TITLES
+    # Titles of the columns of a Tacton's figure, in one line and in two.
+    full_titles = (
+        "waveform about its mean, over the model's largest",
+        "spectrum, dB re the model's largest line",
+    )
+    titles = short_titles if narrow else full_titles
     axes[0, 0].set_title(f"{title}\n{titles[0]}", fontsize="medium", parse_math=False)
     pad = None
     marked = ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d")  # lines that a Tacton's figure names

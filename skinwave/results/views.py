@@ -31,11 +31,9 @@ from skinwave.scene.scene import Scene
 from skinwave.system.json_kinds import fitting
 from skinwave.typing import Array, Floats, Ints
 
-STRONG_LINE_RATIO = 0.1  # to the strongest line: weaker lines need no frames of their own
 KERNEL_GRID = 121  # points along a side of a flat surface
 FIELD_FRAMES = 8  # frames that are exported to other programs
 ARRAYS = ("points", "tets", "surface", "triangles", "times", "motion")
-META = {"body": str, "model": str, "quantity": str, "period": float, "tone": float, "scene": str}
 # Shapes of the arrays in a file: numbers, names of lengths, or None for any length.
 SHAPES: dict[str, tuple[int | str | None, ...]] = {
     "points": ("n", 3), "times": ("f",), "motion": ("f", "n", 3), "surface": ("s",),
@@ -111,10 +109,11 @@ class View:
 
 
 def fastest_line(moved: BodyMotion) -> float:
-    """Return the highest frequency in Hz that moves a body by `STRONG_LINE_RATIO` or more."""
+    """Return the highest frequency in Hz that moves a body by `strong_line_ratio` or more."""
     lines, basis = oscillating(moved.motion), moved.own_basis
     power = np.einsum("fm,mn,fn->f", lines.lines.conj(), basis.T @ basis, lines.lines).real
-    strong = (power > 0) & (power >= STRONG_LINE_RATIO**2 * power.max(initial=0.0))
+    strong_line_ratio = 0.1  # to the strongest line: weaker lines need no frames of their own
+    strong = (power > 0) & (power >= strong_line_ratio**2 * power.max(initial=0.0))
     return float(lines.frequencies[strong].max(initial=0.0))
 
 
@@ -247,9 +246,17 @@ def save(path: Path, view: View) -> None:
 
 def load(path: Path) -> View:
     """Read a view from an npz file; raises a ValueError if the file holds something else."""
+    meta_types = {
+        "body": str,
+        "model": str,
+        "quantity": str,
+        "period": float,
+        "tone": float,
+        "scene": str,
+    }
     try:
         arrays = reading.load_arrays(path)
-        meta: dict[str, Any] = fitting(json.loads(str(arrays["meta"])), META, "meta")
+        meta: dict[str, Any] = fitting(json.loads(str(arrays["meta"])), meta_types, "meta")
         stored = {name: arrays[name] for name in SHAPES if name in arrays}
         _check_arrays(stored)
         if not (len(stored["points"]) and len(stored["surface"]) and meta["period"] > 0):

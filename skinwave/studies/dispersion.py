@@ -40,20 +40,6 @@ LINE_COLUMNS = (
     Column("focus_over_phase_speed", "focus over phase speed"),
     Column("mach_angle_deg", "Mach angle", "degrees", 2),
 )  # fmt: skip
-CAPTION = (
-    "Modes of the laterally infinite body. Strong lines: energy propagates. Pale lines: "
-    "evanescent mode (1/e length below a quarter of its wavelength, or energy speed below a "
-    "twentieth of its phase speed). Dotted: lines of the load; dashed: speed of the "
-    "focus. The group speed is left out where loss distorts a wave packet (imaginary part of dk/dω "
-    "above the real part)."
-)
-EXPLAINED = (
-    "The driven mode of a line moves the surface most at the edge of the main lobe of the focal "
-    "spot. Evanescent modes count only if none propagates. Its share is its magnitude over the sum "
-    "of all magnitudes there. On a straight path, a focus that is "
-    "faster than a wave leaves a wake at the Mach angle asin(c/v). On a path as small as a "
-    "wavelength, no such wake forms."
-)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -220,11 +206,25 @@ def page_parts(driven: DrivenModes, gallery: Gallery) -> list[Part]:
     speed = driven.lines[0].focus_speed if driven.lines else 0.0
     at = driven.lines[0].frequency if driven.lines else float(np.median(driven.curves.frequencies))
     figure = dispersion_figure(driven.curves, lines, speed, at, gallery.style)
-    shown: list[Part] = [" ".join(sentences(driven)), gallery.figure("dispersion", figure, CAPTION)]
+    caption = (
+        "Modes of the laterally infinite body. Strong lines: energy propagates. Pale lines: "
+        "evanescent mode (1/e length below a quarter of its wavelength, or energy speed below a "
+        "twentieth of its phase speed). Dotted: lines of the load; dashed: speed of the focus. "
+        "The group speed is left out where loss distorts a wave packet (imaginary part of dk/dω "
+        "above the real part)."
+    )
+    shown: list[Part] = [" ".join(sentences(driven)), gallery.figure("dispersion", figure, caption)]
     if not driven.lines:
         return shown
     rows = [line.row for line in driven.lines]
-    return [*shown, Table(LINE_COLUMNS, rows, "driven-lines"), EXPLAINED]
+    explained = (
+        "The driven mode of a line moves the surface most at the edge of the main lobe of the "
+        "focal spot. Evanescent modes count only if none propagates. Its share is its magnitude "
+        "over the sum of all magnitudes there. On a straight path, a focus that is faster than a "
+        "wave leaves a wake at the Mach angle asin(c/v). On a path as small as a wavelength, no "
+        "such wake forms."
+    )
+    return [*shown, Table(LINE_COLUMNS, rows, "driven-lines"), explained]
 
 
 def write(folder: Path, driven: DrivenModes) -> None:

@@ -71,13 +71,6 @@ from skinwave.system.table import Table
 MARKS = "Black: path and focus; yellow: probes."
 T = TypeVar("T")
 AT_REST, SIDE_BY_SIDE = "at-rest", "side-by-side"  # names of pictures
-ABOUT_MAPS = (
-    "Shares and spreads come from maps that reach 44 mm from the origin along x and y; areas and "
-    "distances on a curved body are those along its surface. The map of a slab is that of a "
-    "laterally infinite layer. The strongest component is the largest over all probes. The phase "
-    "delay, that of the kernel's strongest component, is known up to whole periods, and includes "
-    "the phase lag of the body; below 0 the body is ahead."
-)
 LOADS = (
     "The published kernel has its published load: a linear drive and a sinc² main lobe. All "
     "other models have the load of the scene."
@@ -600,4 +593,11 @@ def _effects_table(effects: Mapping[str, Mapping[str, Propagation]]) -> list[Par
     ]  # fmt: skip
     known = [k for k in range(len(columns)) if any(row[k] is not None for row in rows)]
     rows = [[row[k] for k in known] for row in rows]
-    return [ABOUT_MAPS, Table([columns[k] for k in known], rows)]
+    about_maps = (
+        "Shares and spreads come from maps that reach 44 mm from the origin along x and y; areas "
+        "and distances on a curved body are those along its surface. The map of a slab is that of "
+        "a laterally infinite layer. The strongest component is the largest over all probes. The "
+        "phase delay, that of the kernel's strongest component, is known up to whole periods, and "
+        "includes the phase lag of the body; below 0 the body is ahead."
+    )
+    return [about_maps, Table([columns[k] for k in known], rows)]

@@ -33,15 +33,6 @@ DURATION = 0.5  # s, of each Tacton; its later half is evaluated
 AMPLITUDES = (0.25, 0.5, 1.0)
 AM = 140.0  # Hz, of the Tacton whose amplitude is varied
 NEGLIGIBLE_RATIO = 1e-5  # of 2 f_AM to f_AM
-# Loads over one period of the modulation m = sin, relative to the largest. Each has its own ratios
-# 2f/f, 3f/f and 4f/f, before the response of the body changes them.
-LOADS: Mapping[str, Callable[[Floats], Floats]] = {
-    "force follows the command, with a mean": lambda m: (1 + m) / 2,
-    "square of the sound's amplitude": lambda m: ((1 + m) / 2) ** 2,
-    "contact on one side only": lambda m: np.maximum(m, 0),
-    "clipped sound, squared": lambda m: np.maximum(m, 0) ** 2,
-    "square root of the command": lambda m: np.sqrt((1 + m) / 2),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,9 +135,18 @@ def _ratio(later: Response) -> float:
 
 
 def load_ratios() -> dict[str, tuple[float, ...]]:
-    """Return the amplitudes at 2f, 3f and 4f relative to that at f, for each of `LOADS`."""
+    """Return the amplitudes at 2f, 3f and 4f relative to that at f, for each of `by_name`."""
     m = np.sin(2 * np.pi * (np.arange(4096) + 0.5) / 4096)
-    spectra = {name: np.abs(np.fft.rfft(load(m))) for name, load in LOADS.items()}
+    # Loads over one period of the modulation m = sin, relative to the largest. Each has its own
+    # ratios 2f/f, 3f/f and 4f/f, before the response of the body changes them.
+    by_name: Mapping[str, Callable[[Floats], Floats]] = {
+        "force follows the command, with a mean": lambda m: (1 + m) / 2,
+        "square of the sound's amplitude": lambda m: ((1 + m) / 2) ** 2,
+        "contact on one side only": lambda m: np.maximum(m, 0),
+        "clipped sound, squared": lambda m: np.maximum(m, 0) ** 2,
+        "square root of the command": lambda m: np.sqrt((1 + m) / 2),
+    }
+    spectra = {name: np.abs(np.fft.rfft(load(m))) for name, load in by_name.items()}
     return {name: tuple((a[2:5] / a[1]).tolist()) for name, a in spectra.items()}
 
 

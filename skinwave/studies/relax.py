@@ -54,13 +54,6 @@ from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
 HIGHEST = 600.0  # Hz, of the lines that are compared
-FIRST = "as published"  # step of the model point-kernel-published
-PAGE_COLUMNS = (
-    "dropped assumption", Column("change of the waveform", digits=2), "at, mm",
-    Column("change of the sensation level", unit="dB", digits=2), "reach above threshold, mm",
-    Column("change if no other assumption is made", digits=2), "largest change of a line",
-    Column("extra time", unit="s", digits=2),
-)  # fmt: skip
 NEGLIGIBLE_TIME = 0.05  # s
 
 
@@ -169,7 +162,8 @@ def hierarchy_of(
     path = scene.tacton.trajectory
     if "continuous path" in names:
         path = device_path(path, update_rate, points)
-    up = [(FIRST, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
+    first_step = "as published"  # step of the model point-kernel-published
+    up = [(first_step, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
     side = [(dropped[-1], dropped)] if (dropped := side_step(scene)) else []
     leave_one_out = [  # except the last, which is a step
         (f"all but: {name}", tuple(n for n in names if n != name))
@@ -453,9 +447,15 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
         "strongest probe; and, on skin, the highest sensation level at a probe, and the distance "
         "from the path up to which a line exceeds the detection threshold."
     )
+    page_columns = (
+        "dropped assumption", Column("change of the waveform", digits=2), "at, mm",
+        Column("change of the sensation level", unit="dB", digits=2), "reach above threshold, mm",
+        Column("change if no other assumption is made", digits=2), "largest change of a line",
+        Column("extra time", unit="s", digits=2),
+    )  # fmt: skip
     parts: list[Part] = [
         Picture(png(_figure(effects, hierarchy.towards), dpi=130), bars, "relax"),
-        Table(PAGE_COLUMNS, map(_page_row, effects)),
+        Table(page_columns, map(_page_row, effects)),
         Details("Steps and their warnings", [
             introduction, steps, warnings_banner(hierarchy.efforts),
         ]),

@@ -43,19 +43,6 @@ from skinwave.system.failures import or_failed
 from skinwave.system.processes import pool
 from skinwave.system.table import Table
 
-TURNED = (
-    "Turn it with the mouse, a finger or the arrow keys. Colour: motion about its mean, red into "
-    "the body, blue out of it. If the legend has ≥, larger values have the end colour. Black: path "
-    "and focus; orange: probes."
-)
-SNAPSHOTS = (
-    "The surface when the body moves most, then at quarters of a turn of the focus, or of a period "
-    "of the strongest line if the focus rests. If the focus is faster than the surface wave, lines "
-    "behind it show the Mach angle asin(c/v). On a circle smaller than a wavelength, no clean cone "
-    "forms."
-)
-MAP = f"Dotted: path of the focus; white: {NEAR:g} dB re the largest."
-
 
 def write_report(
     results: Path,
@@ -124,7 +111,13 @@ def picture_parts(
         missing = [f"Three-dimensional pictures and the film are left out: {renderer().detail}."]
     progress("draw snapshots", 0.0)
     figure = maps.snapshots_figure(views, gallery.style)
-    options["snapshots"] = gallery.figure("snapshots", figure, SNAPSHOTS)
+    snapshots = (
+        "The surface when the body moves most, then at quarters of a turn of the focus, or of a "
+        "period of the strongest line if the focus rests. If the focus is faster than the surface "
+        "wave, lines behind it show the Mach angle asin(c/v). On a circle smaller than a "
+        "wavelength, no clean cone forms."
+    )
+    options["snapshots"] = gallery.figure("snapshots", figure, snapshots)
     progress("draw snapshots", 0.5)
     if isinstance(drawn := options.get("film"), Future):
         progress("film", 0.0)
@@ -132,7 +125,12 @@ def picture_parts(
             options["film"] = drawn.result()
         if "film" in failures:
             del options["film"]
-    turned = inner_page(turntable(own, frame), f"{label(own.column)}. {TURNED}")
+    turned_caption = (
+        "Turn it with the mouse, a finger or the arrow keys. Colour: motion about its mean, red "
+        "into the body, blue out of it. If the legend has ≥, larger values have the end colour. "
+        "Black: path and focus; orange: probes."
+    )
+    turned = inner_page(turntable(own, frame), f"{label(own.column)}. {turned_caption}")
     return [Section("Pictures", [*missing, Choice("pictures", options), turned])]
 
 
@@ -203,7 +201,8 @@ def map_parts(album: Album, gallery: Gallery) -> list[Part]:
 
 
 def _map_caption(scene: Scene) -> str:
-    return f"{maps.rms_text(scene.pressure)} {MAP}"
+    map_caption = f"Dotted: path of the focus; white: {NEAR:g} dB re the largest."
+    return f"{maps.rms_text(scene.pressure)} {map_caption}"
 
 
 def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:

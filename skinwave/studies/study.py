@@ -53,7 +53,6 @@ from skinwave.system.progress_bar import announce, expecting
 COMPLETENESS = (
     "flat-body-harmonic", "flat-body", "plate-modes-transient", "fem", "plate-modes-nonlinear",
 )  # fmt: skip
-LIVE = "live.html"
 Scenes = Mapping[str, Mapping[str, Scene]]  # Tacton -> column -> scene
 
 
@@ -122,6 +121,7 @@ def run_study(
         "is run as published and under the load of the bodies. Amplitudes of all lines are in "
         "lines.csv, waveforms in responses.npz; the folder of each run has its scene."
     )
+    live_file = "live.html"
     with one_thread(), pool(2) as workers:
         live_page = workers.submit(html_file.comparison_page, live)
         with suppress(KeyboardInterrupt):
@@ -153,8 +153,8 @@ def run_study(
             html, why = ("", {}) if interrupted else live_page.result()
             failed |= why
             if html:
-                (folder / LIVE).write_text(html, encoding="utf-8")
-                parts.append(document.live_link(LIVE))
+                (folder / live_file).write_text(html, encoding="utf-8")
+                parts.append(document.live_link(live_file))
         figures: dict[str, Sequence[Run]] = dict(groups)
         conclusions: list[str] = []
         for name, group in groups.items() if measured else ():

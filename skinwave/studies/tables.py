@@ -19,12 +19,6 @@ from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
 MOST_LINES = 12  # in a table
-ERRORS = "body", "expected error of the waveform at the worst probe", "cure of the largest part"
-EFFORT = (
-    "body", "degrees of freedom", "reduced to", Column("estimated reduction error", digits=2),
-    Column("relative energy imbalance", digits=1), "radiated share of loss", "solver",
-    "time by phase", "peak memory, GiB",
-)  # fmt: skip
 
 
 def lines_table(runs: Sequence[Run]) -> list[Part]:
@@ -233,5 +227,15 @@ def effort_table(
     text = f"{plural(tactons, 'Tacton')}: {significant(spent, 2)} s"
     text += f", at most {peak:.2f} GiB in one process" * bool(peak)
     error_rule = "The squares of the parts add, because their causes are independent."
-    parts: list[Part] = [Table(ERRORS, errors), error_rule] if errors else []
-    return [*parts, Table(EFFORT, rows), f"{text}. {named}"]
+    error_columns = (
+        "body",
+        "expected error of the waveform at the worst probe",
+        "cure of the largest part",
+    )
+    parts: list[Part] = [Table(error_columns, errors), error_rule] if errors else []
+    effort_columns = (
+        "body", "degrees of freedom", "reduced to", Column("estimated reduction error", digits=2),
+        Column("relative energy imbalance", digits=1), "radiated share of loss", "solver",
+        "time by phase", "peak memory, GiB",
+    )  # fmt: skip
+    return [*parts, Table(effort_columns, rows), f"{text}. {named}"]

@@ -66,19 +66,18 @@ class Manufactured:
     fixed: Mapping[str, str]
 
 
-CURL = np.cross(np.eye(3), [1.0, 0.0, 0.0]).T  # CURL @ grad = grad x e_x
 # Fixed components: by symmetry, some are 0 on the middle planes of the cube.
 OUTSIDE = {"left": "xyz", "front": "xyz", "bottom": "xyz"}
-ALONG = OUTSIDE | {"right": "yz", "back": "y", "top": "z"}
 
 
 def _divergence_free(lam: float) -> Manufactured:
     """Return curl(psi e_x), psi = sin pi x sin pi y sin pi z: no pressure at any nu; mu = 1."""
     turning = OUTSIDE | {"right": "x", "back": "xz", "top": "xy"}
+    curl = np.cross(np.eye(3), [1.0, 0.0, 0.0]).T  # curl @ grad = grad x e_x
     return Manufactured(
-        u=lambda x: _psi_gradient(x) @ CURL.T,
-        gradient=lambda x: CURL @ _psi_hessian(x),
-        force=lambda x: 3 * np.pi**2 * (_psi_gradient(x) @ CURL.T),
+        u=lambda x: _psi_gradient(x) @ curl.T,
+        gradient=lambda x: curl @ _psi_hessian(x),
+        force=lambda x: 3 * np.pi**2 * (_psi_gradient(x) @ curl.T),
         fixed=turning,
     )
 
@@ -86,23 +85,15 @@ def _divergence_free(lam: float) -> Manufactured:
 def _dilating(lam: float) -> Manufactured:
     """Return psi e_x: its dilatation is as large as its shear, its pressure lam times that."""
     along = np.array([1.0, 0.0, 0.0])
+    along_sides = OUTSIDE | {"right": "yz", "back": "y", "top": "z"}
     return Manufactured(
         u=lambda x: _psi(x)[..., None] * along,
         gradient=lambda x: along[:, None] * _psi_gradient(x)[..., None, :],
         force=lambda x: (
             3 * np.pi**2 * _psi(x)[..., None] * along - (lam + 1) * _psi_hessian(x)[..., 0]
         ),
-        fixed=ALONG,
+        fixed=along_sides,
     )
-
-
-# Poisson's ratio, cells along half a side, and fields; and the largest errors on the finest mesh.
-CONVERGENCE = (
-    (0.3, (2, 4, 7), ("divergence-free",)),
-    (0.3, (3, 5, 8), ("dilating",)),
-    (0.49, (3, 5, 9), ("divergence-free", "dilating")),
-    (0.4999, (3, 5, 9), ("divergence-free", "dilating")),
-)
 
 
 @case(
@@ -114,7 +105,15 @@ def manufactured() -> Checks:
     """Manufactured fields converge with orders 3 and 2, nu = 0.3 to 0.4999."""
     fields = {"divergence-free": _divergence_free, "dilating": _dilating}
     ceilings = (("L2", 5e-4), ("H1 seminorm", 1e-2))
-    for nu, cells, names in CONVERGENCE:
+    # Poisson's ratio, cells along half a side, and fields; and the largest errors on the finest
+    # mesh.
+    convergence = (
+        (0.3, (2, 4, 7), ("divergence-free",)),
+        (0.3, (3, 5, 8), ("dilating",)),
+        (0.49, (3, 5, 9), ("divergence-free", "dilating")),
+        (0.4999, (3, 5, 9), ("divergence-free", "dilating")),
+    )
+    for nu, cells, names in convergence:
         problems = [fields[name](unit(nu).first_lame) for name in names]
         errors = np.array([_errors(n, nu, problems) for n in cells])  # (meshes, fields, norms)
         for k, name in enumerate(names):

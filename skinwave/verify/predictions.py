@@ -31,7 +31,6 @@ BODIES: Mapping[str, Body] = {
     **{name: PRESETS[name] for name in ("skin-slab", "palm-layers", "forearm-layers")},
 }  # fmt: skip
 GRID = np.arange(10.0, 701.0, 10.0)  # Hz: fine enough to track modes
-AT_REST = 1e-3  # Hz, in place of 0, for the static speed of a half-space
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,7 +55,8 @@ def leading_wave(body: Body, grid: ArrayLike | None = None) -> Curves:
     """Return the wave of a body that moves the surface most at the edge of the focal spot's main
     lobe, at ascending frequencies (f,) in Hz (default `GRID`), for half-spaces also at rest.
     """
-    at_rest = [AT_REST] if body.depth == inf else []
+    slowest_hz = 1e-3  # Hz, in place of 0, for the static speed of a half-space
+    at_rest = [slowest_hz] if body.depth == inf else []
     f = np.array([*at_rest, *np.asarray(GRID if grid is None else grid)])
     modes = dispersion(body, f, 6).modes
     amplitudes = np.array([_amplitude(mode) for mode in modes])
@@ -67,7 +67,7 @@ def leading_wave(body: Body, grid: ArrayLike | None = None) -> Curves:
         np.where(propagates, np.array(values)[first, np.arange(len(f))], np.nan)
         for values in ([m.phase_speed for m in modes], [m.decay_length for m in modes])
     )
-    f = np.where(f == AT_REST, 0.0, f)
+    f = np.where(f == slowest_hz, 0.0, f)
     return Curves(frequencies=f, mode=first, speed=speed, length=length)
 
 
@@ -154,7 +154,6 @@ def peak(x: Floats, y: Floats) -> float:
     return float(x[k] + step * (before - after) / (before - 2 * here + after) / 2)
 
 
-HAND_UP = "-x"  # direction of the palm in the file of a hand
 HAND_SIZE = 6.5e-3  # m, of elements: 5 and 8 mm change the 1/e lengths by up to 8 %
 HAND_FREQUENCIES = (200.0, 300.0, 400.0)  # Hz
 
@@ -173,13 +172,14 @@ def along_finger(
 ) -> Finger:
     """Return the decay on the palmar side of the longest finger of a hand, by finite elements.
 
-    The palm in the `file` faces `HAND_UP`. Raises a ValueError if the file is missing or contains
+    The palm in the `file` faces `hand_up`. Raises a ValueError if the file is missing or contains
     no body.
     """
     if not file.is_file():
         raise ValueError(f"--hand {file} does not exist; give the mesh file of a hand")
     report("mesh the hand", 0.0)
-    body = Body(kind="mesh", file=str(file), up=HAND_UP)
+    hand_up = "-x"  # direction of the palm in the file of a hand
+    body = Body(kind="mesh", file=str(file), up=hand_up)
     made = build(body, HAND_SIZE)
     # The tip is the point farthest from the middle; the wrist is on the side with most points.
     top = made.mesh.points[np.unique(made.mesh.facets["top"])][:, :2]

@@ -25,14 +25,6 @@ TOPICS = {
     for topic, module in MODULES.items()
 }
 CASES = {each.name: each for cases in TOPICS.values() for each in cases}
-SCOPE = (
-    "Verification checks that the equations are solved correctly. Most references are closed "
-    "forms, series or integrals from the literature, computed without this program's solvers. "
-    "Other cases compare two of its models, or one model with its own limits or in other units. "
-    "skinwave verify --published checks whether they are the right equations for a hand. Errors "
-    "are relative unless marked as absolute. A case passes if each error is within its tolerance. "
-    "The table shows the check nearest to its tolerance."
-)
 VALUES = ("value", "reference", "error", "tolerance", "result")
 
 
@@ -75,8 +67,16 @@ def page(results: list[Result], planned: int) -> Report:
         for topic, cases in TOPICS.items()
         if any(r.case in cases for r in results)
     ]
+    scope = (
+        "Verification checks that the equations are solved correctly. Most references are closed "
+        "forms, series or integrals from the literature, computed without this program's solvers. "
+        "Other cases compare two of its models, or one model with its own limits or in other "
+        "units. skinwave verify --published checks whether they are the right equations for a "
+        "hand. Errors are relative unless marked as absolute. A case passes if each error is "
+        "within its tolerance. The table shows the check nearest to its tolerance."
+    )
     return Report(
-        "Verification", [" ".join(verdict)], [summary, *topics, SCOPE, spent],
+        "Verification", [" ".join(verdict)], [summary, *topics, scope, spent],
         failures=failures_of(results),
     )  # fmt: skip
 

@@ -46,13 +46,6 @@ COLOURS = {
 }  # fmt: skip
 BAND = "#dddddd"
 DRAWN_FACTOR = 10.0  # larger factors are drawn at this one
-SCOPE = (
-    "Verification checks that the equations are solved correctly. This page checks whether they "
-    "are the right equations, as far as published numbers show. A preset agrees by construction "
-    "with a source that it was fitted to or chosen by; tables mark these pairs as fitted. All "
-    "other values are predictions. A factor is the model's value over the published value, or over "
-    "the nearer end of its spread."
-)
 SPEEDS = (
     "Points: sources, with the spread between people or a standard deviation where published. "
     "Grey: range over all sources at each frequency. Lines: for each preset, the wave that moves "
@@ -231,9 +224,16 @@ def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
         "Hollow: the preset was fitted to that source. Filled: it predicts the source. "
         f"Factors beyond {DRAWN_FACTOR:g} are drawn at {DRAWN_FACTOR:g}."
     )
+    scope = (
+        "Verification checks that the equations are solved correctly. This page checks whether "
+        "they are the right equations, as far as published numbers show. A preset agrees by "
+        "construction with a source that it was fitted to or chosen by; tables mark these pairs "
+        "as fitted. All other values are predictions. A factor is the model's value over the "
+        "published value, or over the nearer end of its spread."
+    )
     parts: list[Part] = [
         _picture("factors", _factors, (10.5, 0.24 * len(sources) + 1.2), factors, rows),
-        " ".join([others[0], *others[1 + len(QUANTITIES):]]), SCOPE,
+        " ".join([others[0], *others[1 + len(QUANTITIES):]]), scope,
         Details("Every set and preset", [_summary(rows)]),
         Details("Every value", [_table(rows)]),
         Section("Speed and decay of waves",
