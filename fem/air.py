@@ -157,8 +157,7 @@ def damping(K: Floats, M: Floats, resistances: Mapping[str, Floats]) -> Floats:
 
 def growth(name: str, omega: Floats) -> Floats:
     """Return the factor (...) of a resistance at angular frequencies (...) in rad/s."""
-    # rad/s: resistances grow no further, as sound of short waves does not.
-    highest = 2 * np.pi * 1000.0
+    highest = 2 * np.pi * 1000.0  # rad/s: resistances of shorter waves grow no further
     return np.asarray(np.minimum(omega, highest) ** RESISTANCES[name])
 
 

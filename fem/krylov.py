@@ -232,8 +232,7 @@ class KrylovBasis:
         gram = block.T @ product - second.T @ second
         block -= _combine(Q, second)
         size = np.sqrt(np.maximum(np.diag(gram), 0.0))
-        # Of a direction: a smaller remainder after orthogonalisation is round-off.
-        round_off = 1e-12
+        round_off = 1e-12  # of a direction: smaller remainders are round-off
         # A space that spans all dofs of a body has no new direction.
         inverse = np.divide(1, size, out=np.zeros_like(size), where=size > round_off * scale)
         squares, directions = np.linalg.eigh(gram * np.outer(inverse, inverse))

@@ -119,7 +119,6 @@ def node_operator(
     """
     nodes = facet_set(mesh, facets)
     surface, local = np.unique(nodes, return_inverse=True)
-    # Of a facet.
     node_places = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])
     if patch:
         normals = _mean_normals(mesh, nodes, mesh.points[surface], patch)
@@ -245,8 +244,7 @@ def facets_below(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
         "ma,ma->m", shape_functions(barycentric, facets.shape[1]), facets[facet, :, 2]
     )
     size = np.ptp(facets[:, :, :2], axis=(0, 1)).max(initial=0.0)
-    # Of the surface's extent: neighbouring facets with this difference are level.
-    same_height = 1e-6
+    same_height = 1e-6  # of the surface's extent: facets closer in height are level
     level = np.rint(height / (same_height * size or 1.0))
     # The last is the highest; of neighbours that share an edge, the one the point is deepest in.
     order = np.lexsort((barycentric.min(axis=1), level, point))

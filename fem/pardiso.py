@@ -57,8 +57,7 @@ class Pardiso:
         self._settings[[0, 1, 7]] = 1, 2, 0  # own settings, METIS, no refinement
         self._settings[[9, TWO_LEVELS]] = 16, 1  # perturbation of pivots
         self._settings[SINGLE] = single
-        # Share of n^2 in the upper triangle; blocks of denser matrices may crash PARDISO.
-        sparse = 0.1
+        sparse = 0.1  # share of n^2: blocks of denser matrices may crash PARDISO
         blocks = 80  # %: similarity of the patterns of rows that PARDISO orders as a block
         if len(indices) < sparse * self._n**2:
             self._settings[BY_BLOCKS] = -blocks
@@ -89,7 +88,7 @@ class Pardiso:
         self._folders.append(_folder(self._n, size, limit))
         # Out of core, blocks and two levels make some solutions 30 times slower.
         self._run("release")
-        out_of_core = 59  # indices of its settings
+        out_of_core = 59  # index of a setting
         self._settings[[TWO_LEVELS, BY_BLOCKS]], self._settings[out_of_core] = 0, 2
         self._environment = partial(_environment, self._folders[0], limit)
         with self._environment():

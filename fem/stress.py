@@ -183,8 +183,7 @@ def fitted_polynomial(x: Floats) -> tuple[Floats, int]:
     coefficients (n, s) of `polynomials` per value of each sample, first the value at the point, and
     the degree.
     """
-    # Weight exp(-locality d^2) of a sample d elements from the point; 0.7 to 5 tried.
-    locality = 1.0
+    locality = 1.0  # of the weight exp(-locality d^2) at d elements; 0.7 to 5 tried
     root = np.exp(-locality / 2 * (x**2).sum(axis=1))  # of the weights
     independent = 1e-8  # of the largest singular value
     degrees = (3, 2, 1, 0)  # of polynomials; the highest that the samples determine is used

@@ -15,7 +15,7 @@ import numpy as np
 from meshes.typing import Array
 
 LARGEST_TEXT = 16_000_000  # bytes
-MOST_UNPACKED = 500_000_000  # bytes of an unpacked archive, or times its size
+MOST_UNPACKED = 500_000_000  # bytes of an unpacked archive
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")  # characters that text files do not have
 
@@ -103,7 +103,7 @@ def read_exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
 
 def load_arrays(path: PathLike) -> dict[str, Array]:
     """Return the arrays of an .npz file by name; raise a ValueError if it unpacks to too much."""
-    most_growth = 8  # bytes of an unpacked archive, or times its size
+    most_growth = 8  # times the size of a larger archive
     with open_regular(path) as file:
         try:
             limit = max(MOST_UNPACKED, most_growth * os.fstat(file.fileno()).st_size)

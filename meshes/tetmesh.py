@@ -106,8 +106,7 @@ class TetMesh:
 
         nodes = self.tets.shape[1]
         cells = np.insert(self.tets, 0, nodes, axis=1).ravel()
-        # Cell type by node count; prefix of facet sets.
-        vtk_kinds, vtk_sets = {4: 10, 10: 24}, "facets:"
+        vtk_kinds, vtk_sets = {4: 10, 10: 24}, "facets:"  # cell types by node count
         kinds = np.full(len(self.tets), vtk_kinds[nodes], np.uint8)
         grid = pv.UnstructuredGrid(cells, kinds, self.points.copy())
         grid.cell_data["region"] = self.region.copy()

@@ -44,7 +44,6 @@ def read_abaqus(path: Path) -> Any:
     loose = current = Part("")
     parts: dict[str, Part] = {}
     instances: list[tuple[Part, Rows]] = []
-    # Keywords that generate, copy or move nodes and elements.
     generating = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
     for keyword, options, rows in _blocks(path):
         if keyword in generating or (keyword == "NODE" and options.get("SYSTEM", "R") != "R"):

@@ -28,7 +28,7 @@ from meshes.volume.quality import check_one_body, dihedral_angles, edge_lengths
 from meshes.volume.tetrahedralise import EPSILON, REST, check_size, graded, tetrahedralise
 
 FINE_RADIUS = 30e-3  # m about the middle of the palm, within which elements have the size h
-GROWTH = 1.25  # of elements beyond it: size ratio of neighbours, limit over h
+GROWTH = 1.25  # of elements beyond it: size ratio of neighbours
 
 Say = Callable[[str], None]
 Progress = Callable[[str, float], None]
@@ -108,7 +108,7 @@ def body_from_file(
         bones = {name: cut for name, bone in bones.items() if (cut := cut_to_box(bone, clip)[0])}
     progress("filling it with tetrahedra", 0.0)
     check_size(surface, "h", h)
-    coarsest = 2.0  # of elements beyond it: size ratio of neighbours, limit over h
+    coarsest = 2.0  # largest elements over h
     grading = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest * h)
     mesh = tetrahedralise(surface, h, inner=bones, sizing=graded(h, grading), timeout=timeout)
     return _with_summary(_with_sides(mesh, planes, 2 * EPSILON * h), say)

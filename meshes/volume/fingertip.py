@@ -19,7 +19,7 @@ from meshes.typing import Floats, Ints
 from meshes.volume.curving import LEAST_RATIO, keep_jacobians
 from meshes.volume.quality import jacobian_ratios
 
-BONE = 1  # regions
+BONE = 1  # region
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +109,7 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
     check_size((2 * shells, 2 * shells, layers + shells), order=2)
     lattice, tets = _lattice(shells, layers)
     points = _map_lattice(shape, lattice, (bone, shells), layers)
-    tissue = 0  # regions
+    tissue = 0
     region = np.where(_shell_of(lattice)[tets].max(axis=1) <= bone, BONE, tissue)
     names = {tissue: "tissue", BONE: "bone"}
     mesh = quadratic(TetMesh(points=points, tets=tets, region=region, region_names=names))

@@ -197,7 +197,7 @@ def _with_regions(mesh: TetMesh, inner: Mapping[str, Surface]) -> TetMesh:
     middles = mesh.points[mesh.tets].mean(axis=1)
     region = np.zeros(len(mesh.tets), np.int64)
     volumes, enclosed = corner_volumes(mesh.points, mesh.tets), [volume(s) for s in inner.values()]
-    inner_volume_error = 0.02  # relative to the volumes within surfaces
+    inner_volume_error = 0.02  # relative to the volume within a surface
     for k in np.argsort(enclosed)[::-1].tolist():
         name, surface = list(inner.items())[k]
         inside = winding_number(surface, middles) > 0.5
@@ -225,7 +225,7 @@ def _checked_result(surface: Surface, epsilon: float, points: Floats, tets: np.n
         )
     enclosed = volume(surface)
     ratio = corner_volumes(mesh.points, mesh.tets).sum() / enclosed
-    volume_error = 0.005  # relative to the volumes within surfaces
+    volume_error = 0.005  # relative to the volume within the surface
     lost_shell = 0.3  # of the volume between surface and envelope that straight facets may cut off
     limit = volume_error + lost_shell * epsilon * area(surface) / enclosed
     if not abs(ratio - 1) <= limit:

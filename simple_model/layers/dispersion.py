@@ -194,8 +194,7 @@ def _roots(stack: Stack, omega: Floats, most: int) -> tuple[Roots, Floats]:
 
 
 def _is_evanescent(wavenumbers: Complex) -> Bools:
-    # |Im k| / |Re k| of a wave that falls to 1/e in a quarter of its length.
-    fastest_decay = 2 / np.pi
+    fastest_decay = 2 / np.pi  # a wave that falls to 1/e in a quarter of its length
     return np.asarray(np.abs(wavenumbers.imag) > fastest_decay * np.abs(wavenumbers.real))
 
 
@@ -336,8 +335,7 @@ def sheet_curves(
         residues=2 * k**2 / by_k, energy_speed=np.full(k.shape, np.inf),
         shapes=np.stack([upper, lower], axis=2),
     )  # fmt: skip
-    sheet_modes = ("bending wave", "bending near field")
-    return curves(f, np.array([0.0, thickness]), roots, sheet_modes)
+    return curves(f, np.array([0.0, thickness]), roots, ("bending wave", "bending near field"))
 
 
 def _bending_wavenumbers(bending: Complex, tension: float, inertia: Floats, air: Floats) -> Complex:

@@ -270,8 +270,7 @@ def _one_minus_exp(p: Complex, thickness: float) -> Complex:
         return np.ones_like(p)
     x = -thickness * p
     lacking = 1 - np.exp(x)
-    # Thickness times wavenumber, below which differences of exponentials lose digits.
-    thin_below = 0.3
+    thin_below = 0.3  # thickness times wavenumber: differences of exponentials lose digits
     thin = np.abs(x.real) + np.abs(x.imag) < thin_below
     lacking[thin] = -np.expm1(x[thin])  # slower than exp
     return np.asarray(lacking)

@@ -30,7 +30,7 @@ BAND = (1.0, 2000.0)  # Hz: lines of loads, and modes that they excite
 FIT_TOLERANCE = 0.005  # relative deviation of a series; motion near resonances deviates more
 
 
-SLOWEST = 8.0  # Hz, 1 / (2 pi time): best for losses up to 2
+SLOWEST = 8.0  # Hz, 1 / (2 pi time)
 LARGEST_LOSS_FACTOR = 10.0
 
 

@@ -77,8 +77,7 @@ class AirLoss:
         (m,) with the forces patterns^T R patterns v.
         """
         k0 = np.asarray(omega, np.float64)[:, None, None] / SPEED_OF_SOUND
-        # Rad: sound of a larger k0 times half the diagonal has the resistance at this one.
-        shortest = 3.0
+        shortest = 3.0  # rad: the resistance of shorter sound is that of this k0
         k0 = np.minimum(k0, shortest / self.reach)
         if not len(self.orders):
             each = np.eye(len(self.patterns))

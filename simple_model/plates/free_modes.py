@@ -126,8 +126,7 @@ def _poles(stiffness: Floats, times: Floats) -> Complex:
     companion[:, 2:, 1] = speed[:, None]
     companion[:, range(2, n), range(2, n)] = -1 / times
     poles = np.linalg.eigvals(companion).astype(np.complex128)
-    newton_steps = 3  # on eigenvalues
-    for _ in range(newton_steps):
+    for _ in range(3):
         poles -= _stiffness(stiffness, times, poles) / _slope(stiffness, times, poles)
     return poles
 

@@ -263,8 +263,7 @@ def _own_stiffness(family: Family, edge_loss: float, w: Floats, added: Complex) 
 
 
 def _chunks(lines: Ints) -> list[Ints]:
-    lines_at_once = 64
-    return np.array_split(lines, -(-len(lines) // lines_at_once)) if len(lines) else []
+    return np.array_split(lines, -(-len(lines) // 64)) if len(lines) else []
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -318,8 +317,7 @@ class _Coupled:
         matrices (van der Vorst and Melissen, IEEE Trans Magn 26:706 (1990)). The preconditioner
         solves modes near a line together and all others alone.
         """
-        # Of the frequency of a line: modes below 1 / 1.3 or above 1.3 are almost uncoupled.
-        coupled = 1.3
+        coupled = 1.3  # of a line's frequency: other modes are almost uncoupled
         low, high = (
             np.searchsorted(self.squared, (self.w * factor) ** 2)
             for factor in (1 / coupled, coupled)
@@ -342,8 +340,7 @@ class _Coupled:
         q, left = np.zeros_like(self.own), forces.astype(np.complex128)
         toward = along = together(left)
         size = (left * toward).sum(axis=1)
-        sweeps = 30  # that a line may need
-        for _ in range(sweeps):
+        for _ in range(30):
             image = self.own * along + self.between(along)
             with np.errstate(divide="ignore", invalid="ignore"):  # of lines that are solved
                 step = np.nan_to_num(size / (along * image).sum(axis=1), posinf=0.0)[:, None]
@@ -414,8 +411,7 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     area = np.kron(x.mass, y.mass)
     mass = np.asarray(plate.mass_per_area * area, np.float64)
     patterns, orders = np.zeros((0, len(mass))), np.zeros((0, 2), np.int64)
-    # Of the mass, for sound: equal frequencies have one mode that radiates, others do not.
-    tie = 1e-9
+    tie = 1e-9  # of the mass: of equal frequencies, one mode radiates
     if plate.air_density:
         added, patterns, orders = air_of(x, y, plate.air_density, plate.frame_width)
         mass += added

@@ -43,7 +43,7 @@ def _in_strata(body: Body, mesh: TetMesh) -> Discretised:
     return Discretised(mesh=mesh, materials=materials)
 
 
-DISC = register(
+register(
     BodyKind(
         name="disc",
         presets={

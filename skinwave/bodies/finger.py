@@ -33,7 +33,7 @@ def discretise(body: Body, h: float) -> Discretised:
     return in_tissue_layers(body, h, replace(mesh, facets=facets))
 
 
-FINGER = register(
+register(
     BodyKind(
         name="finger",
         keys=("bone", "regions"),

@@ -42,7 +42,7 @@ def _corners(facets: Ints) -> set[tuple[int, ...]]:
     return set(map(tuple, np.sort(facets[:, :3], axis=1).tolist()))
 
 
-MESH = register(
+register(
     BodyKind(
         name="mesh",
         keys=("file", "unit", "up", "regions"),

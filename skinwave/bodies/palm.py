@@ -22,9 +22,8 @@ from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.tissue import HAND_CELL, hand_size, in_tissue_layers, support
 
-# Elements at the surface over h, because motion there has the scale of the focal spot; the radius
-# in which they have that size; growth downwards over that sideways, as powers; height over width,
-# at which error and cost balance best.
+# Elements at the surface over h, because motion there has the scale of the focal spot; and their
+# height over their width, at which error and cost balance best.
 SURFACE, FLAT = 0.8, 0.8
 
 
@@ -53,7 +52,7 @@ def grid_lines(body: Body, h: float) -> Lines:
     cell = 0.85
     side = cell * max(1.0, HAND_CELL / h) ** (1 / 3)
     finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
-    fine_radius, downwards = 25e-3, 0.6
+    fine_radius, downwards = 25e-3, 0.6  # m of elements of h; power of growth downwards
     along = Grading(radius=fine_radius, growth=GROWTH, coarsest=coarsest)
     x, y = (mirror_line(graded_axis(side / 2, finest, along)) for side in (body.width, body.height))
     # No cell is higher than its target size. Two meshes that are compared then differ more often in
@@ -72,7 +71,7 @@ def _support(body: Body, mesh: TetMesh) -> fem.Support:
     return support(body, mesh, outward, ends)
 
 
-PALM = register(
+register(
     BodyKind(
         name="palm",
         keys=("relief",),

@@ -171,7 +171,7 @@ def air(body: Body, build: Build, free: Ints) -> Air | None:
     )  # fmt: skip
 
 
-SHEET = register(
+register(
     BodyKind(
         name="sheet",
         keys=("air", "mounting"),

@@ -16,7 +16,7 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import THINNEST, Strata
 from skinwave.bodies.parts import solid_of
 
-AT = 400.0  # coat over a shear wavelength at Hz, the highest lines of Tactons
+AT = 400.0  # Hz, the highest lines of Tactons
 
 
 def check_mesh(body: Body, h: float) -> None:
@@ -103,7 +103,7 @@ def largest_coat(body: Body) -> int:
     strata = body.strata
     slowest = np.minimum.accumulate([solid.shear_speed for _, solid in strata])
     counts = range(1, len(strata) if body.of_kind.may_be_coated else 1)
-    thickest = 0.1  # coat over a shear wavelength at Hz, the highest lines of Tactons
+    thickest = 0.1  # coat over a shear wavelength
     return max((k for k in counts if strata[k][0] <= thickest * slowest[k] / AT), default=0)
 
 

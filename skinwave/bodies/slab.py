@@ -117,7 +117,7 @@ FOREARM_LAYERS = (
     Layer(thickness=4.0e-3, material="forearm-hypodermis"),
 )
 
-SLAB = register(
+register(
     BodyKind(
         name="slab",
         presets={

@@ -69,8 +69,7 @@ def complete_sides(sides: str | Sides, known: Sequence[str], kind: str) -> str |
 
 def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> None:
     """Refuse an unknown base, and an elastic one without its stiffness in N/m3."""
-    bases = (*CONDITIONS, "elastic")
-    choose("base", base, bases)
+    choose("base", base, (*CONDITIONS, "elastic"))
     if base != "elastic":
         if stiffness:
             raise ValueError(
@@ -238,8 +237,7 @@ def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
     reach = mounting.clip_radius
     sides = [clip[axis] + turn * reach for clip in mounting.clips for turn in (-1, 1) if reach]
     placed: list[float] = []
-    # Of the radius of a clip: grid lines on both sides of its edges.
-    relative_lines = (0.1, 0.25, 0.5)
+    relative_lines = (0.1, 0.25, 0.5)  # of the radius of a clip
     for part in (0.0, *relative_lines):
         gap = (part / 2 or NEARLY) * reach
         lines = {side + turn * part * reach for side in sides for turn in (-1, 1)}

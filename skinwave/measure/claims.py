@@ -96,8 +96,7 @@ def _assess(
 
 def _undecidable(measured: LinesByName, claim: str) -> str:
     """Return why a claim cannot be assessed, or ""."""
-    of_several = "M2"  # the claim about several paths
-    if claim == of_several:
+    if claim == "M2":
         return "the claim is about several paths, and the record has one"
     if not is_resolved(measured, claim):
         lost = ", ".join(measured.unresolved) or "its lines"

@@ -43,11 +43,10 @@ def page_section(
     )  # fmt: skip
     largest = np.argsort(-np.abs(lines.mean - main.model), axis=None, kind="stable")
     rows, unit = list(_rows(comparison, main)), comparison.measurement.record.column
-    most_rows = 30  # differences on the page; measured.csv has all
     differences = Table(_columns(comparison), [rows[k] for k in largest]).only(
         "line", "frequency_hz", "x_mm", "y_mm", f"measured_{unit}", f"measured_{unit}_error",
         f"model_{unit}", f"difference_{unit}", "phase_off_deg", "p_adjusted", "finding",
-        most=most_rows,
+        most=30,
     )  # fmt: skip
     no_claims = (
         "The claims concern a single focus that is modulated by at most one tone, moves along a "

@@ -47,8 +47,7 @@ def maxima(frequencies: Floats, products: np.ndarray, window: float) -> tuple[Fl
 
 def _refine(frequencies: Floats, products: np.ndarray, delays: Floats, step: float) -> Floats:
     """Return the maxima of the correlation next to delays (k,), by Newton's method."""
-    newton_steps = 5
-    for _ in range(newton_steps):
+    for _ in range(5):
         slope, bend = (correlation(frequencies, products, delays, n) for n in (1, 2))
         move = np.where(bend < 0, -slope / np.where(bend < 0, bend, -1.0), 0.0)
         delays = delays + np.clip(move, -step, step)

@@ -71,8 +71,7 @@ class Column:
     @property
     def may_be_motion(self) -> bool:
         """Whether the column may hold measured motion."""
-        not_motion = (TIME, FREQUENCY, X, Y, Z, REPETITION, DRIVE, INDEX)
-        return self.role not in not_motion
+        return self.role not in (TIME, FREQUENCY, X, Y, Z, REPETITION, DRIVE, INDEX)
 
     @property
     def is_motion(self) -> bool:

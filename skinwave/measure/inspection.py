@@ -199,7 +199,7 @@ def hum_of(
     recorded drive and do not count. The duration is in s.
     """
     hum: dict[int, str] = {}
-    most_hum = 20  # multiples of the mains frequency
+    most_hum = 20  # times the mains frequency
     for mains, base in _mains(lines, driven):
         for k, line in enumerate(lines):
             n = round(line.frequency / base.frequency)
@@ -274,7 +274,7 @@ def _hum(measured: Measurement, pressure: MovingPressure) -> list[str]:
     f, names = load.frequencies[strong], np.array(load.names)[strong]
     apart = 1 / float(np.ptp(measured.times))
 
-    most_hum_on_load = 7  # multiples of the mains frequency
+    most_hum_on_load = 7  # times the mains frequency
 
     def on(mains: float, within: float) -> np.ndarray:
         n = np.clip(np.round(f / mains), 1, most_hum_on_load)

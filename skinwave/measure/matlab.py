@@ -23,12 +23,13 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     with path.open("rb") as file:
         head = file.read(header + len(hdf5))
     arrays: dict[str, np.ndarray] = {}
-    missing = 'MATLAB 7.3 files need h5py; pip install "skinwave[measure]", or save with -v7'
     try:
         for name, value in (_hdf5 if hdf5 in head else _mat)(path).items():
             _add(arrays, name, value, 0)
     except ImportError:
-        raise ValueError(missing) from None
+        raise ValueError(
+            'MATLAB 7.3 files need h5py; pip install "skinwave[measure]", or save with -v7'
+        ) from None
     except Unreadable:
         raise
     except Exception:  # whatever the libraries raise for damaged bytes

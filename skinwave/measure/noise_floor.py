@@ -8,7 +8,7 @@ from scipy.special import fdtrc, gammaincinv, gammaln
 
 from skinwave.typing import Floats
 
-FEWEST = 10  # bins, at least and at most
+FEWEST = 10  # bins of the band of the median
 CORRELATED = 1 + 2 * (0.28 + 0.016)  # bins under a Hann window per independent bin of a median
 
 
@@ -67,8 +67,8 @@ def _bands(knots: np.ndarray, bins: np.ndarray) -> np.ndarray:
 
 
 def _half_width(k: np.ndarray) -> np.ndarray:
-    half_band = 0.25  # of the frequency: half-width of the band of the median,
-    widest = 400  # bins, at least and at most
+    half_band = 0.25  # of the frequency: half-width of the band of the median
+    widest = 400  # bins
     return np.clip(half_band * k, FEWEST, widest).astype(int)
 
 

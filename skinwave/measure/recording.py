@@ -153,9 +153,9 @@ def _quantity(recording: Recording, given: Given) -> tuple[str, str]:
     unit = given.unit or units.split_level(recording.unit)[0]
     by_unit = units.quantity_of(unit)
     quantity = given.quantity or (given.unit and by_unit) or recording.quantity or by_unit
-    example = "--quantity velocity --unit mm/s"
     if not unit:
         if not quantity:
+            example = "--quantity velocity --unit mm/s"
             raise ValueError(f"the file gives neither quantity nor unit; give {example}")
         known = QUANTITIES.get(quantity)
         usual = units.canonical(known.shown) if known and quantity in units.MOTION else "UNIT"

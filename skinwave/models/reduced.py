@@ -131,16 +131,14 @@ def prepare(
     clock, report, solver = Clock(), options.progress, options.solver
     probes, reading, load = scene.probe_points, scene.reading, scene.load
     tolerance = reduction or reduction_tolerance(options.tolerance)
-    # Times that of the reduction: with `reduction_tolerance` the `series_tolerance`.
-    series_error = 5
+    series_error = 5  # times that of the reduction, as in `series_tolerance`
     body = relaxing(scene.body, series_error * tolerance)
     symmetry = meshed.modelled_axes(body, probes, symmetry, reading, load)
     report("mesh", 0.0)
     build = meshed.mesh_body(body, options.h, clock, silent, symmetry, discretise)
     outputs, solids = meshed.probe_rows(body, build, meshed.images(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
-    # From where a body is reduced for one path, whose load has about as many parts.
-    many_outputs = 24
+    many_outputs = 24  # about as many as a load along one path has parts
     along = scene.loads[0] if own_path and outputs.shape[0] > many_outputs else None
     path = path_key(along) if along else ""
     name = entry_name(

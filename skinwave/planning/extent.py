@@ -61,8 +61,7 @@ def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -
         usual, wide = waveforms(1.0, reduction), waveforms(times_wider, reduction)
         return float(relative_changes(wide - usual, wide).max())
 
-    # Error over change: slabs on springs, free ones and half-spaces had 1.0 to 1.3.
-    margin = 1.5
+    margin = 1.5  # error over change: slabs on springs and half-spaces had 1.0 to 1.3
     coarse_reduction = 0.01  # relative error of bodies that cannot be reduced to less
     try:
         return margin * change(reduction_tolerance(options.tolerance) / 3)  # both have this error

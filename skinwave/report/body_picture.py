@@ -156,8 +156,7 @@ def body_picture(scene: Scene, style: Style = REPORT) -> render.Image:
     Raises the errors of `bodies.build.build`, or a ValueError if the body cannot be meshed.
     """
     drawn = meshed_body(scene.body)
-    height, row = 3.6, 0.24  # inch: of the picture, and of a row of its legend
-    page_width = 7.0  # inch: of the picture, and of a row of its legend
+    page_width, height, row = 7.0, 3.6, 0.24  # inch: of the picture, and of a row of its legend
     inch = style.size(page_width, height)[0] if style.columns else page_width
     width = render.pixels(style, inch)
     image = _render(drawn, scene, style, (width, round(width * height / page_width)), inch)

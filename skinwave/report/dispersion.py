@@ -111,8 +111,7 @@ def _shapes(figure: SubFigure, curves: DispersionCurves, at: float) -> None:
     number = int(np.argmin(np.abs(curves.frequencies - at)))
     known = [n for n, mode in enumerate(curves.modes) if mode.kinds[number]]
     known.sort(key=lambda n: abs(curves.modes[n].wavenumbers[number].imag))
-    most_shapes = 4
-    for n in sorted(known[:most_shapes]):
+    for n in sorted(known[:4]):
         shape = curves.modes[n].shapes[number]
         turned = shape * np.exp(-1j * np.angle(shape[0, 1])) / np.abs(shape).max()
         pale = 1.0 if curves.modes[n].is_wave[number] else PALE

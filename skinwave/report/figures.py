@@ -19,7 +19,7 @@ from skinwave.results.run import Run
 
 P = ParamSpec("P")
 REPORT = STYLES["report"]
-SUBSCRIPT = 0.7  # size over that of its letter; least size in points
+SUBSCRIPT = 0.7  # size over that of its letter
 ROW = 1.45  # height of a row of names over the font size
 LINE_STYLE: dict[str, Any] = {"color": "0.6", "lw": 0.8, "ls": ":", "zorder": 0}
 
@@ -103,7 +103,7 @@ def line_symbol(name: str) -> str:
 
 def name_size() -> float:
     """Return the font size in points of names of lines, whose subscripts are legible."""
-    least_subscript = 7.0  # size over that of its letter; least size in points
+    least_subscript = 7.0  # points
     return max(small(), least_subscript / SUBSCRIPT)
 
 

@@ -72,13 +72,12 @@ def surfaces_figure(
     """
     kernel = next((each for each in surfaces.values() if each.quantity is PRESSURE), None)
     alone = len(surfaces) == 1
-    side = 3.85  # inch: of a snapshot, of a map with its bar, of one map
-    alone_size = 5.0  # inch: of a snapshot, of a map with its bar, of one map
+    side, alone_size = 3.85, 5.0  # inch: of a map with its bar, of one map
     figure, axes = panels(len(surfaces), style, alone_size if alone else side)
     entries: dict[str, Any] = _path_entry(scene, "white")
-    threshold = "#ff2fd0"  # lines: the kernel's -20 dB, the detection threshold
+    threshold = "#ff2fd0"  # of the line of the detection threshold
     raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-    kernel_colour = "#ff9e4a"  # lines: the kernel's -20 dB, the detection threshold
+    kernel_colour = "#ff9e4a"  # of the line of the kernel's -20 dB
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
         quantity, power = surface.quantity, _power_of_ten(surface.unit_rms)
         shown = np.maximum(_finer(surface.unit_rms), 0.0) / 10.0**power
@@ -229,7 +228,7 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
     reach = np.min([np.abs(view.places).max(axis=0) for view in views], axis=0)  # common to all
     raster = np.stack(np.meshgrid(*(np.linspace(-r, r, PIXELS) for r in reach)), axis=-1)
     extent = tuple(1e3 * np.outer(reach, (-1, 1)).ravel())
-    snapshot = 2.7  # inch: of a snapshot, of a map with its bar, of one map
+    snapshot = 2.7  # inch
     size = style.size(snapshot * count + 2.0, snapshot * len(views) + 1.0)
     if style.is_narrow:
         size = size[0], 0.4 * size[0] * len(views) + 0.9

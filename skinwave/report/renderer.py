@@ -33,7 +33,6 @@ def begin() -> "Future[Renderer]":
 
 
 def _test() -> Renderer:
-    packages = "libegl1 libgl1-mesa-dri"
     timeout = 60.0  # s
     try:
         name = subprocess_call.call(draw_sphere, timeout=timeout)
@@ -43,7 +42,7 @@ def _test() -> Renderer:
     except ModuleNotFoundError as error:
         detail = f"the Python package {error.name} is missing; install it"
     except Exception:
-        detail = f"the GL libraries are missing; on Debian, run apt install {packages}"
+        detail = "the GL libraries are missing; on Debian, run apt install libegl1 libgl1-mesa-dri"
     return Renderer(is_available=False, detail=detail)
 
 

@@ -296,8 +296,7 @@ def multiple_levels(run: NamedLines) -> Floats:
     dB re f_AM there. Sums and differences of both frequencies are not "these frequency harmonics".
     """
     names = [n for n in rivals(run) if not ("f_AM" in n and "f_d" in n)]
-    no_line = -300.0
-    return _probe_levels(run, names, "f_AM").max(axis=0, initial=no_line)
+    return _probe_levels(run, names, "f_AM").max(axis=0, initial=-300.0)
 
 
 def strongest_rival(run: NamedLines) -> tuple[str, float]:

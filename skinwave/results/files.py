@@ -23,8 +23,7 @@ DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[\d¹²³]", re.IGNORECASE)  # o
 
 def folder_name(name: str) -> str:
     """Return a scene's name as a folder or file name that is valid on all systems."""
-    # Characters and bytes, so that an ending fits into 255 bytes.
-    longest_name, most_bytes = 80, 200
+    longest_name, most_bytes = 80, 200  # an ending then fits into 255 bytes
     plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:longest_name]
     plain = plain.encode()[:most_bytes].decode(errors="ignore").strip()
     reserved = ("pictures", "propagation", "sensation")  # names of files and folders of pages

@@ -107,8 +107,7 @@ class Gallery:
 def _compress(image: Pillow.Image) -> tuple[bytes, str]:
     """Return a small file of a picture, and its format."""
     buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
-    quality = 88  # of pictures inside a page
-    image.save(buffer, format=kind, quality=quality, method=4)
+    image.save(buffer, format=kind, quality=88, method=4)
     return buffer.getvalue(), kind
 
 
@@ -472,9 +471,8 @@ def _deflection_text(run: Run) -> str:
 
 def _propagation_sentence(first: FirstScreen) -> str:
     effect = first.own[first.body.column]
-    no_motion = "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
     if effect.strongest is None:
-        return no_motion
+        return "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
     name, line = label(effect.column), effect.strongest
     if effect.share is None:
         return f"The {name} moves most at {line.frequency:.0f} Hz ({line.name})."

@@ -181,9 +181,8 @@ def _film(own: View, views: Sequence[View], style: Style, progress: Progress) ->
     if not features.check("webp"):
         return Picture(gif, caption, "film", "gif")
     buffer = io.BytesIO()
-    film_quality = 60
     with Pillow.open(io.BytesIO(gif)) as frames:
-        frames.save(buffer, format="webp", save_all=True, quality=film_quality, method=2, loop=0)
+        frames.save(buffer, format="webp", save_all=True, quality=60, method=2, loop=0)
     return Picture(buffer.getvalue(), caption, "film", "webp", {"gif": gif})
 
 

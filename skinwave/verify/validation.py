@@ -360,8 +360,7 @@ def _sources(ax: Axes, quantity: Quantity) -> None:
     low, high = (np.array(x) / size for x in (whole.lows, whole.highs))
     ax.fill_between(whole.frequencies, low, high, color=BAND, lw=0, zorder=0)
     sets = [each for each in WAVES if each.quantity is quantity]
-    markers = "osv^DPX"
-    for marker, each in zip(markers, sets, strict=False):
+    for marker, each in zip("osv^DPX", sets, strict=False):
         low, high = np.array([each.between(k) for k in range(len(each.values))]).T / size
         middle = np.where(np.isnan(each.values), (low + high) / 2, np.array(each.values) / size)
         errors = np.stack([middle - low, high - middle]) if each.lows else None
