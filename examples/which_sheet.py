@@ -35,7 +35,7 @@ from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.plates.modes import PlateModes, modal_motion, plate_modes
 from simple_model.plates.path_forces import modal_path_forces
 from skinwave.models.plate_modes import plate_of, relative_modulus
-from skinwave.results.claims import BOTH, CLAIMS, MUCH_LOWER, NEEDED, rival_levels, strongest_rival
+from skinwave.results.claims import CLAIMS, MUCH_LOWER, rival_levels, strongest_rival
 from skinwave.results.run import Run
 from skinwave.scene.distributions import uniform
 from skinwave.scene.file import dumps, from_table
@@ -165,7 +165,7 @@ def assess(candidate: Row) -> dict[str, Any]:
     row["sag_over_thickness"] = float(np.abs(sag).max()) / scene.body.depth
     for claim in CLAIMED:
         row[f"{claim}_holds"], row[f"{claim}_value"] = claim_of(claim, runs)
-    both = [run for run in runs if (run.is_am, run.is_stm) == BOTH]
+    both = [run for run in runs if run.is_am and run.is_stm]
     row["rival_line"] = strongest_rival(max(both, key=lambda run: rival_levels(run).max()))[0]
     return row
 
@@ -193,12 +193,12 @@ def _runs(scene: Scene, modes: PlateModes) -> Iterator[tuple[Run, Floats]]:
 
 def claim_of(claim: str, runs: Sequence[Run]) -> tuple[int, float]:
     """Return whether a claim holds (0 or 1) and its value, nan without the lines that it needs."""
-    kinds, evaluate = CLAIMS[ASSESSED_AS.get(claim, claim)]
-    own = [run for run in runs if (run.is_am, run.is_stm) in kinds]
-    needed = set(NEEDED[claim][0] if claim in NEEDED else ["f_AM"])
+    assessed = CLAIMS[ASSESSED_AS.get(claim, claim)]
+    own = [run for run in runs if (run.is_am, run.is_stm) in assessed.kinds]
+    needed = set(CLAIMS[claim].needs[0] if CLAIMS[claim].needs else ["f_AM"])
     if not all(run.frequencies.keys() >= needed for run in own):
         return 0, nan
-    holds, value, *_ = evaluate(own)
+    holds, value, *_ = assessed.assess(own)
     return int(holds), float(value)
 
 

@@ -255,9 +255,9 @@ def drives() -> str:
 
 def claims() -> str:
     """Return the claims of the paper about spectral lines."""
-    from skinwave.results.claims import TEXTS
+    from skinwave.results.claims import CLAIMS
 
-    return table(["claim", ""], TEXTS.items())
+    return table(["claim", ""], ((claim.name, claim.text) for claim in CLAIMS.values()))
 
 
 # Verification

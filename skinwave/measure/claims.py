@@ -1,26 +1,17 @@
 """Claims of Lim, Seifi and Park, assessed on a measurement with noise."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from simple_model.numbers import decibel
 from skinwave.measure.lines import MeasuredLines
-from skinwave.results.claims import (
-    CLAIMS,
-    NEEDED,
-    PAIRS,
-    LinesByName,
-    NamedLines,
-    is_resolved,
-    is_single,
-)
+from skinwave.results.claims import CLAIMS, Claim, LinesByName, is_resolved, is_single
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "cannot be decided"
-OF_PEAKS = ("S2", "S5")  # claims about the frequencies of peaks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,21 +48,18 @@ def assess_measured(measured: LinesByName) -> list[MeasuredClaim]:
     if not is_single(measured):
         return []
     kind = measured.is_am, measured.is_stm
-    concerned = ((claim, assess) for claim, (kinds, assess) in CLAIMS.items() if kind in kinds)
     return [
-        MeasuredClaim(claim=claim, finding=finding, sentence=sentence)
-        for claim, assess in concerned
-        for finding, sentence in [_assess(measured, claim, assess)]
-    ]
+        MeasuredClaim(claim=claim.name, finding=finding, sentence=sentence)
+        for claim in CLAIMS.values() if kind in claim.kinds
+        for finding, sentence in [_assess(measured, claim)]
+    ]  # fmt: skip
 
 
-def _assess(
-    measured: LinesByName, claim: str, assess: Callable[[Sequence[NamedLines]], tuple]
-) -> tuple[str, str]:
+def _assess(measured: LinesByName, claim: Claim) -> tuple[str, str]:
     if reason := _undecidable(measured, claim):
         return UNDECIDED, reason
-    if claim in OF_PEAKS:
-        holds, _, _, sentence = assess([measured])
+    if claim.is_of_peaks:
+        holds, _, _, sentence = claim.assess([measured])
         return HOLDS if holds else FAILS, sentence
     at = measured.lines["f_AM"] > measured.radius["f_AM"]
     clear = replace(
@@ -79,8 +67,10 @@ def _assess(
         lines={name: a[at] for name, a in measured.lines.items()},
         radius={name: r[at] for name, r in measured.radius.items()},
     )  # fmt: skip
-    best, worst = ([assess([_vary(clear, claim, way, am)]) for am in (-1, 1)] for way in (1, -1))
-    sentence = assess([clear])[3]
+    best, worst = (
+        [claim.assess([_vary(clear, claim, way, am)]) for am in (-1, 1)] for way in (1, -1)
+    )
+    sentence = claim.assess([clear])[3]
     if not at.all():
         sentence += f"; assessed at {at.sum()} of {len(at)} places, where f_AM is above the noise"
     if all(one[0] for one in worst):
@@ -94,36 +84,32 @@ def _assess(
     )  # fmt: skip
 
 
-def _undecidable(measured: LinesByName, claim: str) -> str:
+def _undecidable(measured: LinesByName, claim: Claim) -> str:
     """Return why a claim cannot be assessed, or ""."""
-    if claim == "M2":
+    if claim.is_of_paths:
         return "the claim is about several paths, and the record has one"
     if not is_resolved(measured, claim):
         lost = ", ".join(measured.unresolved) or "its lines"
         return f"the record is too short, or sampled too slowly, to resolve {lost}"
     known = measured.frequencies.keys()
-    about = next((n for n in NEEDED.get(claim, ()) if known >= set(n)), tuple(known))
+    about = next((n for n in claim.needs if known >= set(n)), tuple(known))
     if any(np.isnan(measured.radius[name]).any() for name in about):
         return "the noise is unknown, without repetitions and bins between the lines"
-    if claim in OF_PEAKS and not len(measured.spectrum[0]):
+    if claim.is_of_peaks and not len(measured.spectrum[0]):
         return "the record has single lines, without the spectrum between them"
-    needed = about if claim in OF_PEAKS else ("f_AM",)
+    needed = about if claim.is_of_peaks else ("f_AM",)
     weak = [n for n in needed if not (measured.lines[n] > measured.radius[n]).any()]
     return f"{', '.join(weak)} not above the noise at any place" if weak else ""
 
 
-def _vary(measured: LinesByName, claim: str, way: int, am: int) -> LinesByName:
+def _vary(measured: LinesByName, claim: Claim, way: int, am: int) -> LinesByName:
     """Return amplitudes varied within the noise for a claim (way 1) or against it (-1)."""
     of_am = measured.frequencies["f_AM"]
-
-    present = {  # lines that a claim expects, while others are to be weak
-        "S3": PAIRS, "M1": ("2f_AM", "3f_AM"), "M3": ("f_d", "2f_AM"),
-    }  # fmt: skip
 
     def sign(name: str) -> int:
         if measured.frequencies[name] == of_am:
             return am
-        return way if name in present.get(claim, ()) else -way
+        return way if name in claim.expects else -way
 
     return replace(measured, lines={
         name: np.maximum(a + sign(name) * measured.radius[name], 0.0)

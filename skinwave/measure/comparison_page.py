@@ -24,7 +24,7 @@ from skinwave.measure.inspection import flaws, unsteady
 from skinwave.measure.misfit import LARGEST_MISFIT, NOT_DESCRIBED
 from skinwave.report.palette import label
 from skinwave.report.spectra import MOST_LINES, lines_figure
-from skinwave.results.claims import TEXTS
+from skinwave.results.claims import CLAIMS
 from skinwave.system.document import Details, Part, Picture, Section
 from skinwave.system.table import Column, Table
 
@@ -158,7 +158,7 @@ def claims_table(comparison: MeasuredComparison) -> Table:
     """Return the claims that concern the Tacton, with their findings in the measurement."""
     classes = {HOLDS: "yes", FAILS: "no"}
     rows = [
-        (f"{one.claim}: {TEXTS[one.claim]}",
+        (f"{one.claim}: {CLAIMS[one.claim].text}",
          Markup('<span class="{}">{}</span>').format(classes.get(one.finding, ""), one.finding),
          one.sentence)
         for one in comparison.claims

@@ -3,7 +3,7 @@
 S1 to S5 are claims about their simulation, M1 to M5 about their measurement on paper.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
@@ -22,6 +22,7 @@ ABSENT = -120.0
 MUCH_LOWER = -20.0  # a tenth of the amplitude
 ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
 NO_PEAK = "a line that the claim is about has no spectral peak next to it"
+PAIRS = ("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,6 +47,28 @@ class LinesByName(OfTacton):
 
 
 NamedLines = Run | LinesByName
+Assessment = tuple[bool, float, float, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """Statement of the paper about spectral lines.
+
+    kinds : kinds of runs that it is about, as whether each is AM, and STM
+    assess : function that returns whether it holds, the value that decides, its limit, a sentence
+    needs : sets of lines, one of which it needs; by default it needs all lines
+    expects : lines that it expects, while others are to be weak
+    is_of_peaks, is_of_paths : whether it is about the frequencies of peaks, and several paths
+    """
+
+    name: str
+    text: str
+    kinds: tuple[tuple[bool, bool], ...]
+    assess: Callable[[Sequence[NamedLines]], Assessment]
+    needs: tuple[tuple[str, ...], ...] = ()
+    expects: tuple[str, ...] = ()
+    is_of_peaks: bool = False
+    is_of_paths: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,13 +96,13 @@ def evaluate(runs: Iterable[Run]) -> list[AssessedClaim]:
         groups.setdefault((run.body, run.model), []).append(run)
     assessed_claims = []
     for (body, model), group in groups.items():
-        for claim, (kinds, assess) in CLAIMS.items():
-            about = [run for run in group if (run.is_am, run.is_stm) in kinds]
+        for claim in CLAIMS.values():
+            about = [run for run in group if (run.is_am, run.is_stm) in claim.kinds]
             if chosen := [run for run in about if is_resolved(run, claim)]:
-                holds, value, bar, sentence = assess(chosen)
+                holds, value, bar, sentence = claim.assess(chosen)
                 assessed_claims.append(
                     AssessedClaim(
-                        claim=claim, body=body, model=model, holds=bool(holds),
+                        claim=claim.name, body=body, model=model, holds=bool(holds),
                         value=float(value), bar=bar, sentence=sentence,
                     )
                 )  # fmt: skip
@@ -97,9 +120,6 @@ def write_claims(path: Path, assessed_claims: Iterable[AssessedClaim]) -> None:
     path.write_bytes(table.to_csv())
 
 
-Assessment = tuple[bool, float, float, str]
-
-
 def is_single(run: NamedLines) -> bool:
     """Whether the Tacton is of the measured kind: one focus, with one steady AM tone or none."""
     tacton = run.scene.tacton
@@ -110,10 +130,10 @@ def is_single(run: NamedLines) -> bool:
     return bool(plain and one and tacton.trajectory.shape != "recorded")
 
 
-def is_resolved(run: NamedLines, claim: str) -> bool:
+def is_resolved(run: NamedLines, claim: Claim) -> bool:
     """Whether the lines that a claim is about are resolved."""
-    if claim in NEEDED:
-        return any(run.frequencies.keys() >= set(names) for names in NEEDED[claim])
+    if claim.needs:
+        return any(run.frequencies.keys() >= set(names) for names in claim.needs)
     return "f_AM" in run.frequencies and bool(rivals(run)) and not run.unresolved
 
 
@@ -230,43 +250,37 @@ def _bound(offset: float) -> str:
 
 # Kinds of runs that claims are about: whether the amplitude is modulated, and the focus moves.
 AM, STM, BOTH = (True, False), (False, True), (True, True)
-CLAIMS: dict[
-    str, tuple[tuple[tuple[bool, bool], ...], Callable[[Sequence[NamedLines]], Assessment]]
-] = {
-    "S1": ((AM,), _single_line),
-    "S2": ((STM,), _drawing_lines),
-    "S3": ((BOTH,), _pairs_only),
-    "S4": ((BOTH,), _am_highest),
-    "S5": ((AM, STM), _exact_frequencies),
-    "M1": ((AM,), _am_harmonics),
-    "M2": ((STM,), _same_places),
-    "M3": ((BOTH,), _both_multiples),
-    "M4": ((BOTH,), _am_highest_measured),
-    "M5": ((BOTH,), _much_lower),
-}
-# Sets of lines, one of which a claim needs; claims that are not listed need all lines.
-DRAWN = (("f_d", "2f_d", "3f_d"),)
-PAIRS = ("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM")
-NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
-    "S2": DRAWN,
-    "S3": (("f_AM", *DRAWN[0], *PAIRS),),
-    "S5": (("f_AM",), ("f_d",)),
-    "M1": (("f_AM", "2f_AM", "3f_AM"),),
-    "M2": DRAWN,
-    "M3": (("f_AM", "2f_AM", "f_d"),),
-}
-TEXTS = {
-    "S1": "Simulated, AM alone: a single line at f_AM.",
-    "S2": "Simulated, STM alone: lines at multiples of f_d.",
-    "S3": "Simulated, AM+STM: f_AM and the pairs n f_d ± f_AM, no line at n f_d.",
-    "S4": "Simulated, AM+STM: f_AM is the highest line, whatever the path.",
-    "S5": "Both: lines exactly at the commanded f_AM and f_d.",
-    "M1": "Measured, AM alone: lines at multiples of f_AM.",
-    "M2": "Measured, STM alone: the same lines for every path with the same f_d.",
-    "M3": "Measured, AM+STM: lines at multiples of both f_AM and f_d.",
-    "M4": "Measured, AM+STM: f_AM is the highest line, whatever the path.",
-    "M5": "Measured, AM+STM: the multiples of f_AM and f_d are much lower than f_AM.",
-}
+CLAIMS: Mapping[str, Claim] = {
+    claim.name: claim
+    for claim in (
+        Claim(name="S1", kinds=(AM,), assess=_single_line,
+              text="Simulated, AM alone: a single line at f_AM."),
+        Claim(name="S2", kinds=(STM,), assess=_drawing_lines,
+              text="Simulated, STM alone: lines at multiples of f_d.",
+              needs=(("f_d", "2f_d", "3f_d"),), is_of_peaks=True),
+        Claim(name="S3", kinds=(BOTH,), assess=_pairs_only,
+              text="Simulated, AM+STM: f_AM and the pairs n f_d ± f_AM, no line at n f_d.",
+              needs=(("f_AM", "f_d", "2f_d", "3f_d", *PAIRS),), expects=PAIRS),
+        Claim(name="S4", kinds=(BOTH,), assess=_am_highest,
+              text="Simulated, AM+STM: f_AM is the highest line, whatever the path."),
+        Claim(name="S5", kinds=(AM, STM), assess=_exact_frequencies,
+              text="Both: lines exactly at the commanded f_AM and f_d.",
+              needs=(("f_AM",), ("f_d",)), is_of_peaks=True),
+        Claim(name="M1", kinds=(AM,), assess=_am_harmonics,
+              text="Measured, AM alone: lines at multiples of f_AM.",
+              needs=(("f_AM", "2f_AM", "3f_AM"),), expects=("2f_AM", "3f_AM")),
+        Claim(name="M2", kinds=(STM,), assess=_same_places,
+              text="Measured, STM alone: the same lines for every path with the same f_d.",
+              needs=(("f_d", "2f_d", "3f_d"),), is_of_paths=True),
+        Claim(name="M3", kinds=(BOTH,), assess=_both_multiples,
+              text="Measured, AM+STM: lines at multiples of both f_AM and f_d.",
+              needs=(("f_AM", "2f_AM", "f_d"),), expects=("f_d", "2f_AM")),
+        Claim(name="M4", kinds=(BOTH,), assess=_am_highest_measured,
+              text="Measured, AM+STM: f_AM is the highest line, whatever the path."),
+        Claim(name="M5", kinds=(BOTH,), assess=_much_lower,
+              text="Measured, AM+STM: the multiples of f_AM and f_d are much lower than f_AM."),
+    )
+}  # fmt: skip
 
 
 def _probe_levels(

@@ -40,7 +40,8 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
     motion = response.values[:, probe] - response.values[:, probe].mean()
     largest = float(np.abs(motion).max())
     samples = np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16)
-    unit = response.record.shown.translate(str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"}))
+    plain_letters = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # for file names
+    unit = response.record.shown.translate(plain_letters)
     x, y = 1e3 * response.probes[probe]
     scale = f"{response.record.per_unit * largest:.4g}_{unit}"
     path = folder / f"probe_{x:g}_{y:g}_mm_full_scale_{scale}.wav"

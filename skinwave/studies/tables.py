@@ -10,7 +10,7 @@ from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report.figures import run_label
 from skinwave.report.palette import label
 from skinwave.report.spectra import sensation_levels, strongest_probe
-from skinwave.results.claims import TEXTS, AssessedClaim
+from skinwave.results.claims import CLAIMS, AssessedClaim
 from skinwave.results.comparison import compare, moving_rms
 from skinwave.results.propagation import strongest_component
 from skinwave.results.run import Run
@@ -88,11 +88,11 @@ def claims_parts(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
         return []
     columns = list(dict.fromkeys(v.column for v in assessed_claims))
     by_cell = {(v.claim, v.column): v for v in assessed_claims}
-    claims = [claim for claim in TEXTS if any(claim == v.claim for v in assessed_claims)]
+    claims = [claim for claim in CLAIMS if any(claim == v.claim for v in assessed_claims)]
     marks, numbers = [], []
     for claim in claims:
         own = [by_cell.get((claim, column)) for column in columns]
-        marks.append([f"{claim}: {TEXTS[claim]}", *map(_mark, own)])
+        marks.append([f"{claim}: {CLAIMS[claim].text}", *map(_mark, own)])
         numbers.append([claim, *(v.sentence if v else None for v in own)])
     names = list(map(label, columns))
     levels = (

@@ -12,7 +12,7 @@ from in_browser import needs_browser
 
 from skinwave.commands.cli import main
 from skinwave.report.renderer import renderer
-from skinwave.results.claims import TEXTS
+from skinwave.results.claims import CLAIMS
 from skinwave.scene import paper15
 
 pytestmark = pytest.mark.slow
@@ -62,7 +62,7 @@ def test_every_response_is_within_the_tolerance_and_the_memory_is_bounded(job):
 
 def test_claims_about_the_simulation_hold_in_the_published_kernel(claims):
     published = {claim: row for (column, claim), row in claims.items() if column == PUBLISHED}
-    assert set(TEXTS) == set(published)
+    assert set(CLAIMS) == set(published)
     for claim in ("S1", "S2", "S3", "S4", "S5"):
         assert published[claim]["holds"] == "True", published[claim]
     assert float(published["S3"]["value"]) < -120
