@@ -59,7 +59,7 @@ def waves() -> None:
     tacton = dict(paper15.tactons())[TACTON]
     scene = paper15.scenes("bench", tacton, {"slab": BODY})["slab"]
     mesh, times = build(BODY, SIZE).mesh, np.arange(STEPS + 1) / RATE
-    P, points = fem.load_operator(mesh), fem.facet_points(mesh)
+    P, points = fem.pressure_operator(mesh), fem.facet_points(mesh)
     load = {
         "fixed": np.isin(np.arange(len(mesh.points)), mesh.facets["bottom"]),
         "forces": csr_array(P @ scene.pressure(points, times).T),

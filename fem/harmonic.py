@@ -84,7 +84,7 @@ def harmonic(
     >>> import fem, meshes
     >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
     >>> ops = fem.assemble(mesh, fem.PRESETS["palm"], fixed="bottom")
-    >>> force = fem.load_operator(mesh).sum(axis=1)  # 1 Pa on the whole top
+    >>> force = fem.pressure_operator(mesh).sum(axis=1)  # 1 Pa on the whole top
     >>> u = fem.harmonic(ops, force, [140.0])[0]
     >>> (1e9 * abs(fem.probe_operator(mesh, [[0.0, 0.0]]) @ u)).round(1)  # nm
     array([156.4])

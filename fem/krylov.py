@@ -99,7 +99,7 @@ def reduce(
     >>> import fem, meshes
     >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
     >>> ops = fem.assemble(mesh, fem.PRESETS["palm"], fixed="bottom")
-    >>> S, force = fem.probe_operator(mesh, [[0.0, 0.0]]), fem.load_operator(mesh).sum(axis=1)
+    >>> S, force = fem.probe_operator(mesh, [[0.0, 0.0]]), fem.pressure_operator(mesh).sum(axis=1)
     >>> model = fem.reduce(ops, S, 500.0, 1e-3, loads=force[:, None])
     >>> len(ops.free), len(model.operators.K)
     (972, 12)

@@ -18,7 +18,7 @@ FACET_MARGIN = 1e-6  # barycentric: points this close outside a facet count as o
 NEWTON_TOLERANCE = 1e-9  # of a facet's size
 
 
-def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
+def pressure_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
     """Return the load operator P (3 n, k q): nodal forces in N for pressures in Pa.
 
     Pressures are values at `facet_points` and act into the body, against the outward normal. Raises
@@ -28,7 +28,7 @@ def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array
     --------
     >>> import fem, meshes
     >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
-    >>> force = fem.load_operator(mesh).sum(axis=1)  # 1 Pa on the whole top, 4 cm2
+    >>> force = fem.pressure_operator(mesh).sum(axis=1)  # 1 Pa on the whole top, 4 cm2
     >>> float(force[2::3].sum().round(9))  # N
     -0.0004
     """
@@ -57,7 +57,7 @@ def _forces(mesh: TetMesh, facets: str | Ints, values: Floats) -> sparse.csr_arr
 
 
 def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
-    """Return the quadrature points (k q, 3) of `load_operator`, in m.
+    """Return the quadrature points (k q, 3) of `pressure_operator`, in m.
 
     >>> import fem, meshes
     >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)

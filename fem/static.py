@@ -42,7 +42,7 @@ def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floa
     >>> import fem, meshes
     >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
     >>> ops = fem.assemble(mesh, fem.PRESETS["palm"], fixed="bottom")
-    >>> u = fem.static(ops, fem.load_operator(mesh).sum(axis=1))  # 1 Pa on the whole top
+    >>> u = fem.static(ops, fem.pressure_operator(mesh).sum(axis=1))  # 1 Pa on the whole top
     >>> (1e9 * (fem.probe_operator(mesh, [[0.0, 0.0]]) @ u)).round(1)  # nm
     array([93.])
     """

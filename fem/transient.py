@@ -80,7 +80,7 @@ def transient(
     >>> import fem, meshes
     >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
     >>> ops = fem.assemble(mesh, fem.PRESETS["palm"], fixed="bottom")
-    >>> step = fem.load_operator(mesh).sum(axis=1)  # 1 Pa on the whole top from t = 0
+    >>> step = fem.pressure_operator(mesh).sum(axis=1)  # 1 Pa on the whole top from t = 0
     >>> *_, last = islice(fem.transient(ops, lambda t: step, 2e-4), 51)  # to t = 10 ms
     >>> (1e9 * (fem.probe_operator(mesh, [[0.0, 0.0]]) @ last.displacement)).round(1)  # nm
     array([82.4])

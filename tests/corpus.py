@@ -217,7 +217,7 @@ def broken_meshes() -> dict[str, Callable[[], object]]:
         "grading": (lambda g: grading(**g), ({"radius": nan}, {"radius": 0, "growth": 0.5})),
         "grid": (lambda x: meshes.extrude(x, [0, 1], [0, 1]), ([1, 0], [0, nan])),
         "half": (lambda axis: meshes.half(cube, axis), ("w", "z")),
-        "load": (lambda f: fem.load_operator(cube, f), ("lid", top + 10**6)),
+        "load": (lambda f: fem.pressure_operator(cube, f), ("lid", top + 10**6)),
         "probe": (lambda p: fem.probe_operator(cube, p), ([[2, 0]], [[nan, 0]], [[0]])),
         "assembly": (lambda a: fem.assemble(cube, **({"material": skin} | a)), (
             {"material": "palm"}, {"fixed": {"top": "w"}}, {"fixed": everything})),

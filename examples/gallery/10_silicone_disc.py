@@ -19,7 +19,7 @@ silicone = fem.Material(density=1070, shear_modulus=25e3, poisson=0.4999, viscos
 width = 8e-3  # m, standard deviation of a focus that is broad enough for large elements
 mesh = disc(0.080, 0.020, 0.006)
 operators = fem.assemble(mesh, silicone, fixed="bottom")
-P, points = fem.load_operator(mesh), fem.facet_points(mesh)
+P, points = fem.pressure_operator(mesh), fem.facet_points(mesh)
 force = P @ np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / width**2)  # N, of 1 Pa
 
 # %%

@@ -28,7 +28,7 @@ operators = fem.assemble(mesh, materials, fixed="sides")
 
 # %%
 # A focus of 50 Pa at rest on the pad, and a second one 4 mm towards the tip.
-P, points = fem.load_operator(mesh), fem.facet_points(mesh)
+P, points = fem.pressure_operator(mesh), fem.facet_points(mesh)
 
 
 def focus(y):

@@ -25,7 +25,7 @@ for order in (1, 2):
     errors = []
     for h in sizes:
         mesh = meshes.block((width, width, length), h, order=order)
-        P = fem.load_operator(mesh)
+        P = fem.pressure_operator(mesh)
         force = P @ np.ones(P.shape[1])  # N, of 1 Pa
         u = fem.harmonic(fem.assemble(mesh, foam), force, hertz)[0]
         errors.append(abs(force @ u / width**2 / expected - 1))

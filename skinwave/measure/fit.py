@@ -14,7 +14,7 @@ from skinwave.measure.measurement import Measurement
 from skinwave.measure.observed import KINDS, data_of
 from skinwave.measure.parameters import Parameter, check_limits, of_scene, parse
 from skinwave.measure.predicted import Target, target, with_reduction
-from skinwave.measure.search import Problem, Solution, solve
+from skinwave.measure.search import Problem, Solution, minimise
 from skinwave.planning.plan import model_from_rest
 from skinwave.scene.distributions import Distribution
 from skinwave.scene.file import to_table, with_distributions
@@ -117,7 +117,7 @@ def fit(
     aim = with_reduction(aim, parameters, progress)
     data = data_of(kind, measured, aim)
     problem = Problem(parameters=parameters, data=data, linear=aim.linear)
-    solution = solve(problem, starts, seed, progress)
+    solution = minimise(problem, starts, seed, progress)
     return Fit(measured=measured, target=aim, solution=solution, intervals=intervals(solution))
 
 

@@ -115,7 +115,7 @@ class Solution:
         return sum(start.cost - best <= same_cost * self.scale for start in self.starts)
 
 
-def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solution:
+def minimise(problem: Problem, starts: int, seed: int, progress: Progress) -> Solution:
     """Return the best result of several starts, from a Latin hypercube between the limits."""
     k, count = len(problem.parameters.free), problem.data.values.size
     if starts < 1:

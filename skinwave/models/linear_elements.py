@@ -41,6 +41,7 @@ from skinwave.models.laws import has_own_law, relaxing, series_tolerance
 from skinwave.models.limits import held_air_limits, of_body, vacuum_limits
 from skinwave.models.options import SolveOptions, response_of, solver_name
 from skinwave.models.reduced import answer, prepare
+from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.load import SupportMotion
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Clock, Progress
@@ -241,12 +242,12 @@ def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respo
     report, solver = options.progress, options.solver
     threshold = options.tolerance / 50  # of the strongest line
     clock, quantity = Clock(), scene.reading.record
-    axes = meshed.modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
+    axes = modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
     build = meshed.mesh_body(scene.body, options.h, clock, report, axes)
     ops = meshed.assemble(build, clock, report)
-    P, points = meshed.even_part(*meshed.surface_load(build, scene.load), axes)
+    P, points = even_part(*meshed.surface_load(build, scene.load), axes)
     S, solids = meshed.probe_rows(
-        scene.body, build, meshed.images(scene.probe_points, axes), scene.reading
+        scene.body, build, images(scene.probe_points, axes), scene.reading
     )
     solve = fem.LineSolver(ops, solver)
     with clock("lines"):
@@ -348,7 +349,7 @@ def _line_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
 
 
 def _stepped_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
-    axes = meshed.modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
+    axes = modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
     n = effort.dofs * 2 ** len(axes)  # the whole body
     dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     steps = step_count(float(computed_times(scene, options)[-1]), dt)

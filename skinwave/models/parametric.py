@@ -53,13 +53,14 @@ from skinwave.models.laws import relaxing
 from skinwave.models.options import DEFAULT, solver_name, underflow_to_zero
 from skinwave.models.reduced import (
     ReducedBody,
+    cache_key,
     cached_record,
-    entry_name,
     reduced_of,
     store_record,
     typical_spots,
 )
 from skinwave.models.reduced import answer as answer_of
+from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, silent
 from skinwave.typing import Bools, Floats
@@ -164,11 +165,11 @@ def prepare(
         bodies = _range(scene.body, keys, h)
         body = bodies.body(bodies.meshed)
         # Probes on a plane of symmetry need only one half.
-        axes = meshed.modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
+        axes = modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
         mesh = cached(partial(build_at, bodies, symmetry=axes))
         build = mesh(bodies.meshed)
     reference = reference_of(body, build, keys)
-    of_body = entry_name(
+    of_body = cache_key(
         body, build, scene.probe_points, solver, tolerance, outputs=_probes(scene, body, build),
         load=scene.load,
     )  # fmt: skip
@@ -344,13 +345,13 @@ def at(prepared: ParametricBody, values: Mapping[str, float]) -> ReducedBody:
 
 def _probes(scene: Scene, body: Body, build: Build) -> sparse.csr_array:
     """Return the probe operator (p c, 3 n) of a mesh."""
-    places = meshed.images(scene.probe_points, build.symmetry)
+    places = images(scene.probe_points, build.symmetry)
     return meshed.probe_rows(body, build, places, scene.reading)[0]
 
 
 def _surface(scene: Scene, build: Build) -> tuple[sparse.csr_array, Floats]:
     """Return the load operator (3 n, c k) of a mesh, and the points (k, 3) of the load."""
-    return meshed.even_part(*meshed.surface_load(build, scene.load), build.symmetry)
+    return even_part(*meshed.surface_load(build, scene.load), build.symmetry)
 
 
 def _line_forces(scene: Scene, P: sparse.csr_array, points: Floats) -> tuple[Floats, fem.Complex]:

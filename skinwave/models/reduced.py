@@ -44,6 +44,7 @@ from skinwave.models.options import (
     solver_name,
     underflow_to_zero,
 )
+from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import SURFACE, Body, Reading, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
@@ -133,15 +134,15 @@ def prepare(
     tolerance = reduction or reduction_tolerance(options.tolerance)
     series_error = 5  # times that of the reduction, as in `series_tolerance`
     body = relaxing(scene.body, series_error * tolerance)
-    symmetry = meshed.modelled_axes(body, probes, symmetry, reading, load)
+    symmetry = modelled_axes(body, probes, symmetry, reading, load)
     report("mesh", 0.0)
     build = meshed.mesh_body(body, options.h, clock, silent, symmetry, discretise)
-    outputs, solids = meshed.probe_rows(body, build, meshed.images(probes, symmetry), reading)
+    outputs, solids = meshed.probe_rows(body, build, images(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
     many_outputs = 24  # about as many as a load along one path has parts
     along = scene.loads[0] if own_path and outputs.shape[0] > many_outputs else None
     path = path_key(along) if along else ""
-    name = entry_name(
+    name = cache_key(
         body, build, probes, solver, tolerance, outputs=own, load=load,
         path=f"{path} {reading.record.rate}" if along else "", band=options.band,
     )  # fmt: skip
@@ -175,7 +176,7 @@ def store_record(name: str, record: object) -> None:
     cache.store(name, encode(record, arrays), **arrays)
 
 
-def entry_name(
+def cache_key(
     body: Body,
     build: Build,
     probes: Floats,
@@ -229,7 +230,7 @@ def _prepare(
     path_share = 3  # of that tolerance: error of the load along a path
     with clock("factorise and reduce"):
         report("factorise", 0.0)
-        P, points = meshed.even_part(*meshed.surface_load(build, load), build.symmetry)
+        P, points = even_part(*meshed.surface_load(build, load), build.symmetry)
         still = meshed.sag(build, operators, outputs, load, solver)
         motion = load.support_motion
         loads = meshed.spread(P, typical_spots(body, points))

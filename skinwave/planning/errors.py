@@ -14,8 +14,9 @@ from skinwave.models.limits import takes
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.plate_modes import STRETCHED, thick_mesh_part
 from skinwave.models.reduced import ReducedBody
+from skinwave.planning.deflection import stretching_error
 from skinwave.planning.estimates import spot_scale
-from skinwave.planning.left_out import series_error, stretching_error
+from skinwave.planning.left_out import series_error
 from skinwave.planning.plan_warnings import rigid_body_drift, under_resolved
 from skinwave.planning.refinement import enough
 from skinwave.scene.scene import Scene

@@ -17,10 +17,10 @@ from skinwave.bodies.analytic import is_flat_layer
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import discretise
 from skinwave.bodies.supports import EDGES
-from skinwave.models.meshed import mirrored_axes
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import answer, prepare, reduction_tolerance
 from skinwave.models.relative_change import relative_changes
+from skinwave.models.symmetry import mirrored_axes
 from skinwave.planning.estimates import FAR, absorbing_reflection, spot_scale
 from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import about_its_rest, element_sizes

@@ -29,6 +29,7 @@ from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED, thin_plate_
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import answer, prepare
 from skinwave.planning import errors, estimates, left_out
+from skinwave.planning.deflection import linear_deflection, stretches
 from skinwave.planning.extent import absorbing_error, extent, symmetry
 from skinwave.planning.plan_warnings import implausible
 from skinwave.planning.record import Plan, PlanRow
@@ -187,9 +188,9 @@ def model_from_rest(scene: Scene, options: SolveOptions = DEFAULT) -> tuple[Mode
     tolerance = options.tolerance
     if options.h is not None and scene.body.of_kind.is_plate and takes(FEM, scene):
         return FEM, _why_elements(scene)
-    if stretching := left_out.stretches(scene, tolerance):
+    if stretching := stretches(scene, tolerance):
         return STRETCHED, (
-            f"a linear sheet would deflect by {significant(left_out.linear_deflection(scene), 2)} "
+            f"a linear sheet would deflect by {significant(linear_deflection(scene), 2)} "
             f"thicknesses, and stretching changes its motion by {change_text(stretching)}"
         )
     reflections = _reflections(scene)
@@ -240,7 +241,7 @@ def why_modes(scene: Scene, tolerance: float) -> str:
     """Return the reason to use plate modes instead of elements; "" if elements are better."""
     if not takes(FROM_REST, scene) or not _suffices(FROM_REST, scene, tolerance):
         return ""
-    return "a flat sheet with clamped sides, whose modes need no mesh"
+    return "a flat sheet on supports, whose modes need no mesh"
 
 
 def _suffices(model: Model, scene: Scene, tolerance: float) -> bool:

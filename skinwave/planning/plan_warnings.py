@@ -13,8 +13,8 @@ from simple_model.numbers import EN_DASH, plural, significant
 from simple_model.response import LINE_BINS, SETTLE, resolution
 from skinwave.models import named
 from skinwave.models.limits import cures_for, in_words
+from skinwave.planning.deflection import LINEAR, deflection_ratio
 from skinwave.planning.estimates import mean_gain
-from skinwave.planning.left_out import LINEAR, deflection_ratio
 from skinwave.scene.scene import Scene
 
 NONLINEAR = "plate-modes-nonlinear", "fem-nonlinear"  # the cheaper first

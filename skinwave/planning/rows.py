@@ -7,9 +7,9 @@ from simple_model.numbers import EN_DASH, change_text, percent, significant
 from skinwave.bodies.sheet import air_mass
 from skinwave.bodies.sizes import AT, coat, layer_name, thicknesses
 from skinwave.models import Cost
-from skinwave.models.meshed import axes_of_probes, mirrored_axes
 from skinwave.models.reduced import reduction_tolerance
-from skinwave.planning.left_out import mean_sag
+from skinwave.models.symmetry import axes_of_probes, mirrored_axes
+from skinwave.planning.deflection import mean_sag
 from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import Refined
 from skinwave.scene.scene import Body, Scene

@@ -73,15 +73,15 @@ def simulate(
 
 
 def solve(scene: Scene, planned: Plan) -> Response:
-    """Solve a scene as planned, and check the response; raises the errors of `simulate`."""
+    """Solve a scene as planned, and state the error; raises the errors of `simulate`."""
     options = replace(planned.options, model=planned.model, h=planned.h or planned.options.h)
     if planned.prepared and named(planned.model).is_reduced:
         times, first = sample_grid(scene, options.times)
         whole = answer(planned.prepared, scene, options.progress, times=times)
-        return _check(scene, planned, from_first(whole, first))
+        return _with_errors(scene, planned, from_first(whole, first))
     with expecting(options.progress, planned.seconds):
         response = _solve_by_model(replace(scene, body=planned.body), options)
-    return _check(scene, planned, response)
+    return _with_errors(scene, planned, response)
 
 
 def compute(scene: Scene, model: str, **options: Any) -> Response:
@@ -105,7 +105,7 @@ def _solve_by_model(scene: Scene, options: SolveOptions) -> Response:
     return replace(response, load=scene.pressure, effort=effort)
 
 
-def _check(scene: Scene, planned: Plan, response: Response) -> Response:
+def _with_errors(scene: Scene, planned: Plan, response: Response) -> Response:
     """Return the response with planned errors, or those measured instead, and all warnings."""
     statement = planned.statement.with_parts(response.effort.errors.parts)
     return stated(scene, response, statement, planned.cautions)

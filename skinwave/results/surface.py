@@ -29,8 +29,8 @@ from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.plate_modes import FROM_REST, sheet_motion
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import read_at
+from skinwave.planning.deflection import stretches
 from skinwave.planning.errors import own_parts
-from skinwave.planning.left_out import stretches
 from skinwave.results.comparison import steady_lines as fitted_lines
 from skinwave.results.motion import (
     REDUCTION_TOLERANCE,

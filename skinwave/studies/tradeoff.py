@@ -24,7 +24,7 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.models.plate_modes import MODES as PLATES
 from skinwave.models.reduced import answer, prepare
-from skinwave.planning.left_out import stretches
+from skinwave.planning.deflection import stretches
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import legend, png
 from skinwave.results.comparison import compare

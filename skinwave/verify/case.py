@@ -105,25 +105,25 @@ def relative(
     value, reference = np.ravel(value), np.ravel(reference)
     errors = np.abs(value / reference - 1)
     worst = int(np.argmax(errors))
-    return _check(what, abs(value[worst]), abs(reference[worst]), errors[worst], bar, unit)
+    return _in_unit(what, abs(value[worst]), abs(reference[worst]), errors[worst], bar, unit)
 
 
 def misfit(what: str, value: ArrayLike, reference: ArrayLike, bar: float, unit: str = "") -> Check:
     """Check the relative L2 distance of two curves or fields; the largest magnitudes are shown."""
     value, reference = np.asarray(value), np.asarray(reference)
     error = np.linalg.norm(value - reference) / np.linalg.norm(reference)
-    return _check(what, np.abs(value).max(), np.abs(reference).max(), error, bar, unit)
+    return _in_unit(what, np.abs(value).max(), np.abs(reference).max(), error, bar, unit)
 
 
 def below(what: str, value: SupportsFloat, bar: float, unit: str = "") -> Check:
     """Check a number whose reference is 0, absolutely."""
-    return _check(what, value, 0.0, abs(float(value)), bar, unit)
+    return _in_unit(what, value, 0.0, abs(float(value)), bar, unit)
 
 
 def absolute(what: str, value: complex, reference: complex, bar: float) -> Check:
     """Check the absolute error of one number; magnitudes are shown."""
     error = abs(value - reference)
-    return _check(f"{what} (absolute)", abs(value), abs(reference), error, bar)
+    return _in_unit(f"{what} (absolute)", abs(value), abs(reference), error, bar)
 
 
 def order(what: str, sizes: ArrayLike, errors: ArrayLike, expected: float, band: float) -> Check:
@@ -132,7 +132,7 @@ def order(what: str, sizes: ArrayLike, errors: ArrayLike, expected: float, band:
     return absolute(what, slope, expected, band)
 
 
-def _check(
+def _in_unit(
     what: str, value: SupportsFloat, reference: SupportsFloat, error: SupportsFloat, bar: float,
     unit: str = "",
 ) -> Check:  # fmt: skip

@@ -197,7 +197,7 @@ def _line(
     n = lines.harmonics[chosen]
     ops = quarter(bool(n[0] % 2))
     spots = path_fourier(load, load.spot(fem.facet_points(mesh), path_samples(load)).T, n).real
-    force = fem.load_operator(mesh) @ (spots @ lines.coefficients[chosen])
+    force = fem.pressure_operator(mesh) @ (spots @ lines.coefficients[chosen])
     return fem.probe_operator(mesh, probes) @ fem.harmonic(ops, force, hz)[0]
 
 

@@ -139,6 +139,6 @@ def _response(
 def _forces(load: MovingPressure, h: float, places: Sequence[tuple[float, float]]) -> Floats:
     """Return downward forces (n,) in N with the focus at places of a body with a free rim."""
     mesh = build(replace(BODY, sides="free"), h).mesh
-    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    P, points = fem.pressure_operator(mesh), fem.facet_points(mesh)[:, :2]
     pressure = load.spot(points, np.array(places)) * float(load.gain(np.zeros(1))[0])
     return -np.asarray((P @ pressure.T).reshape(-1, 3, len(places))[:, 2].sum(axis=0))

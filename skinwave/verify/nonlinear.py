@@ -58,7 +58,7 @@ def clamped_disc() -> Checks:
     """Clamped disc with an immovable edge, deflected by up to 1.8 thicknesses."""
     radius, paper, meshed = 0.05, replace(PAPER.solid, loss_factor=0.0), 2e-3
     mesh = quarter_disc(radius, meshed, 16)
-    P, S = fem.load_operator(mesh), fem.probe_operator(mesh, [[0, 0]])
+    P, S = fem.pressure_operator(mesh), fem.probe_operator(mesh, [[0, 0]])
     for name, thickness in (("solid", meshed), ("equivalent of 0.1 mm", 1e-4)):
         # A thin disc is meshed as a thick one of the same bending stiffness, with a membrane.
         ratio = thickness / meshed
@@ -116,7 +116,7 @@ def free_energy() -> Checks:
     lossless = replace(PAPER, material=replace(PAPER.solid, loss_factor=0.0))
     made = meshed_sheet(lossless, min(PAPER.width, PAPER.height) / 4)
     mesh, body = made.mesh, stretching_body(lossless, made)
-    P, S = fem.load_operator(mesh), fem.probe_operator(mesh, [[0, 0]])
+    P, S = fem.pressure_operator(mesh), fem.probe_operator(mesh, [[0, 0]])
     # 6 Pa deflect the coarse sheet by three thicknesses.
     u = nonlinear.static(body, P @ np.full(P.shape[1], 6.2))
     start, steps = replace(fem.at_rest(mesh.n_dofs), displacement=u), 800

@@ -136,7 +136,7 @@ def moving_force() -> Checks:
     mesh = meshes.extrude(np.linspace(0, length, n + 1), [0, 0.02], np.linspace(-thickness, 0, 2))
     ops = fem.assemble(mesh, material, fixed={"left": "z", "right": "z", "front": "y", "back": "y"})
     first = np.pi / 2 / length**2 * np.sqrt(material.young * thickness**2 / 12 / material.density)
-    P, x = fem.load_operator(mesh), fem.facet_points(mesh)[:, 0]
+    P, x = fem.pressure_operator(mesh), fem.facet_points(mesh)[:, 0]
     total = np.asarray(-P.sum(axis=0)).sum() / length * spot * np.sqrt(2 * np.pi)
     S = fem.probe_operator(mesh, [[length / 2, 0.01]])
     stiffness = 48 * material.young * 0.02 * thickness**3 / 12 / length**3

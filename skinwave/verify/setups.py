@@ -37,7 +37,7 @@ def gaussian(width: float = WIDTH) -> Callable[[Array], Array]:
 def push(mesh: TetMesh, pressure: Callable[[Array], Array] | None = None) -> Array:
     """Return nodal forces (3 n,) in N of a pressure on the top; 1 Pa by default."""
     points = fem.facet_points(mesh)
-    return fem.load_operator(mesh) @ (pressure(points) if pressure else np.ones(len(points)))
+    return fem.pressure_operator(mesh) @ (pressure(points) if pressure else np.ones(len(points)))
 
 
 def read(mesh: TetMesh, u: Array, x: ArrayLike, y: float = 0.0) -> Array:

@@ -193,7 +193,7 @@ def test_a_support_keeps_the_balance_of_energy():
     many = np.ones(len(fem.facet_points(block, facets)))
     rest = fem.Support(facets=facets, stiffness=1e7 * many, absorbed=many)
     ops = fem.assemble(block, fem.PRESETS["palm"], fixed={}, support=rest)
-    push = fem.load_operator(block).sum(axis=1)
+    push = fem.pressure_operator(block).sum(axis=1)
     force = lambda t: push * 100 * np.sin(2 * np.pi * 200 * t)  # noqa: E731
     states = islice(fem.transient(ops, force, 1e-4), 40)
     *_, (state, spent) = fem.with_energy_balance(ops, states, force)

@@ -18,7 +18,7 @@ from skinwave.models import named
 from skinwave.models.limits import beyond
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import middle_compliance, plate_of
-from skinwave.planning.left_out import mean_sag
+from skinwave.planning.deflection import mean_sag
 from skinwave.scene.scene import BODIES, Body, Scene
 
 PAPER = orthotropic(density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35)
@@ -129,7 +129,7 @@ def test_frequencies_of_a_curled_sheet_are_those_of_a_shallow_shell():
 def test_elements_deflect_as_ritzs_plate_does(mounting):
     body, places = replace(SMALL, mounting=mounting), np.array([[0, 0], [0.011, 0.004]])
     made = build(body, 0.05 / 20)
-    P = fem.load_operator(made.mesh)
+    P = fem.pressure_operator(made.mesh)
     points = fem.facet_points(made.mesh)
     spot = np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / 0.00435**2)
     u = fem.probe_operator(made.mesh, places) @ fem.static(operators(made), P @ spot)

@@ -141,7 +141,7 @@ def test_curved_membrane_under_pressure_has_laplace_tension(bent):
     sigma = PLANE_STRESS * (strain + STIFF.poisson * strain[::-1])
     pressure = 1e-5 * (sigma[0] + sigma[1] * (bent[1] > 0)) / radius
     found = bump.ravel() @ (added(mesh, thin)[0] @ u.ravel())
-    P = fem.load_operator(mesh)  # into the body
+    P = fem.pressure_operator(mesh)  # into the body
     expected = -bump.ravel() @ (P @ np.full(P.shape[1], pressure))
     assert found == pytest.approx(expected, rel=0.01)
 
@@ -202,7 +202,7 @@ def test_half_of_a_symmetric_body_moves_like_the_whole():
         operators = fem.assemble(part, soft, fixed=fixed, coat=THIN)
         at = fem.facet_points(part)
         load = np.exp(-(at[:, :2] ** 2).sum(axis=1) / 2 / 3e-3**2)
-        u = fem.static(operators, fem.load_operator(part) @ load)
+        u = fem.static(operators, fem.pressure_operator(part) @ load)
         found[axes] = fem.probe_operator(part, [[0.0, 0.0], [2e-3, 3e-3]]) @ u
     np.testing.assert_allclose(found["x"], found[""], rtol=1e-7)
     np.testing.assert_allclose(found["xy"], found[""], rtol=1e-7)
@@ -226,7 +226,7 @@ def quarter():
         mask[mesh.points[:, axis] > x[-1] - 1e-9] = True
     mask[mesh.points[:, 2] < -DEPTH + 1e-9] = True
     at = fem.facet_points(mesh)
-    load = fem.load_operator(mesh) @ np.exp(-(at[:, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
+    load = fem.pressure_operator(mesh) @ np.exp(-(at[:, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
     probes = fem.probe_operator(mesh, np.c_[RADII, 0 * RADII])
     return mesh, mask, fem.assemble(mesh, FOREARM, fixed=mask), load, probes
 

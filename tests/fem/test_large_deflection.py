@@ -72,7 +72,7 @@ def test_small_deflection_matches_a_linear_plate():
 def test_step_that_does_not_converge_is_halved(sheet, monkeypatch):
     monkeypatch.setattr(nonlinear, "MOST_ITERATIONS", 4)
     made, body = sheet
-    P = fem.load_operator(made.mesh)
+    P = fem.pressure_operator(made.mesh)
     push, times = P @ np.full(P.shape[1], 20.0), set()
 
     def force(t):
@@ -87,7 +87,7 @@ def test_step_that_does_not_converge_is_halved(sheet, monkeypatch):
 
 def test_states_before_a_failure_are_yielded(sheet):
     made, body = sheet
-    P = fem.load_operator(made.mesh)
+    P = fem.pressure_operator(made.mesh)
     push = P @ np.ones(P.shape[1])
     states = nonlinear.dynamic(body, lambda t: push * (np.nan if t > 2.5e-4 else 1), 1e-4)
     first = [next(states) for _ in range(3)]

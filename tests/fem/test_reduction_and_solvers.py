@@ -127,7 +127,7 @@ def test_single_precision_factor_is_refined_or_replaced(stiff, monkeypatch, slow
 def test_lines_of_a_thin_sheet_match_double_precision():
     mesh = meshes.sheet(0.1, 0.1, 1e-4, 0.005)
     ops = fem.assemble(mesh, fem.PRESETS["paper"], fixed="sides")
-    force = fem.load_operator(mesh) @ np.ones(len(fem.facet_points(mesh)))
+    force = fem.pressure_operator(mesh) @ np.ones(len(fem.facet_points(mesh)))
     S = fem.probe_operator(mesh, PROBES)
     for hertz in (80.0, 140.0):
         s = 2j * np.pi * hertz
@@ -170,7 +170,7 @@ def misfit(candidate, reference):
 @pytest.mark.parametrize(("kind", "h"), [("skin", 0.01), ("sheet", 0.0125)])
 def test_error_estimate_is_near_the_true_error(kind, h):
     mesh, ops = body(kind, h)
-    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    P, points = fem.pressure_operator(mesh), fem.facet_points(mesh)[:, :2]
     S = fem.probe_operator(mesh, PROBES)
     centres = np.random.default_rng(2).uniform(-0.02, 0.02, (12, 2))
     F = P @ MovingPressure(tacton=Tacton()).spot(points, centres).T
@@ -188,7 +188,7 @@ def test_basis_of_all_dofs_gives_the_full_model():
     mesh = meshes.block((0.06, 0.06, 0.015), 0.06)
     ops = fem.assemble(mesh, replace(fem.PRESETS["palm"], viscosity=0.0))
     S = fem.probe_operator(mesh, np.column_stack([np.linspace(0, 0.02, 40)] * 2))
-    F = fem.load_operator(mesh).toarray()
+    F = fem.pressure_operator(mesh).toarray()
     for probes, tolerance in ((S, 0.5), (S, 1e-3), (S[:6], 1e-3)):
         model = fem.reduce(ops, probes, 1000.0, tolerance, loads=F)
         assert len(model.operators.K) <= len(ops.free)
@@ -205,7 +205,7 @@ def test_dependent_probes_in_one_element():
     ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
     places = np.column_stack([np.linspace(0, 0.01, 41), np.zeros(41)])
     places[1] = places[0]
-    F = (fem.load_operator(mesh) @ np.ones(len(fem.facet_points(mesh))))[:, None]
+    F = (fem.pressure_operator(mesh) @ np.ones(len(fem.facet_points(mesh))))[:, None]
     S = fem.probe_operator(mesh, places)
     model = fem.reduce(ops, S, 300.0, 1e-3, loads=F)
     found = fem.transfer(model, model.basis.T @ F, [140.0])[0]
@@ -286,7 +286,7 @@ def test_mean_powers_of_an_oscillator_are_those_of_its_dashpots():
 def test_energy_imbalance_is_refused():
     mesh = meshes.block((0.03, 0.03, 0.01), 0.006)
     ops = fem.assemble(mesh, fem.PRESETS["palm"])
-    push = fem.load_operator(mesh) @ np.ones(fem.load_operator(mesh).shape[1])
+    push = fem.pressure_operator(mesh) @ np.ones(fem.pressure_operator(mesh).shape[1])
     states = list(islice(fem.transient(ops, lambda t: push, 1e-4), 50))
     *_, (state, spent) = fem.with_energy_balance(ops, iter(states), lambda t: push)
     stored = fem.mechanical_energy(ops, state)
@@ -356,7 +356,7 @@ def test_combinations_equal_matrices_assembled_part_by_part(material):
 def test_moments_by_combinations_equal_those_by_products(material):
     mesh, ops, _ = block(material)
     S = fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.001]])
-    F = fem.load_operator(mesh) @ np.random.default_rng(0).random((len(facet_points(mesh)), 3))
+    F = fem.pressure_operator(mesh) @ np.random.default_rng(0).random((len(facet_points(mesh)), 3))
     both = ops, replace(ops, laws=None)
     found, plain = (fem.reduce(each, S, 500.0, 1e-3, loads=F) for each in both)
     assert found.moments == plain.moments

@@ -89,7 +89,7 @@ def test_stress_below_a_focus_matches_boussinesq(half_space):
     ops = fem.assemble(mesh, material, fixed={"clamped": "xyz", "mirror_x": "x", "mirror_y": "y"})
     away = fem.facet_points(mesh)[:, None, :2] - FOCI
     pressure = np.exp(-(away**2).sum(axis=2) / 2 / WIDTH**2).sum(axis=1)
-    u = fem.static(ops, fem.load_operator(mesh) @ pressure)
+    u = fem.static(ops, fem.pressure_operator(mesh) @ pressure)
     around = [(5e-3, 5e-3), (7.3e-3, 5e-3), (9e-3, 8e-3)]
     points = [(x, y, -z) for x, y in around for z in (0.0, 0.7e-3, 2e-3, 5e-3)]
     found = stress_at(mesh, material, points, u)
@@ -111,7 +111,7 @@ def test_thick_cylinder_under_pressure_matches_lame(poisson):
     mesh = replace(mesh, points=bent)
     material = fem.Material(density=1, shear_modulus=1.0, poisson=poisson)
     ops = fem.assemble(mesh, material, fixed={"front": "y", "back": "x", "top": "z", "bottom": "z"})
-    P = fem.load_operator(mesh, "left")
+    P = fem.pressure_operator(mesh, "left")
     u = fem.static(ops, P @ np.ones(P.shape[1]))
     radii = np.array([1.01, 1.2, 1.5, 1.9])
     points = np.column_stack([radii * np.cos(0.7), radii * np.sin(0.7), 0 * radii - 0.15])
@@ -134,7 +134,7 @@ def test_strain_jumps_between_materials():
                  1: fem.Material(density=1, shear_modulus=3.0, poisson=0.4999)}  # fmt: skip
     sides = {"left": "x", "right": "x", "front": "y", "back": "y", "bottom": "z"}
     ops = fem.assemble(mesh, materials, fixed=sides)
-    P = fem.load_operator(mesh)
+    P = fem.pressure_operator(mesh)
     u = fem.static(ops, P @ np.ones(P.shape[1]))
     points = [(0.4, 0.6, z) for z in (-0.05, -0.45, -0.55, -0.95)]
     found = (strain_operator(mesh, materials, points) @ u).reshape(-1, 6)[:, 2]

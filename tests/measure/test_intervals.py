@@ -11,7 +11,7 @@ from skinwave.measure import Measurement, observed
 from skinwave.measure.intervals import intervals, whiteness, widening
 from skinwave.measure.observed import Data
 from skinwave.measure.parameters import Parameter, parse
-from skinwave.measure.search import Problem, descend, refine, solve
+from skinwave.measure.search import Problem, descend, minimise, refine
 from skinwave.scene.file import loads
 from skinwave.system.effort import silent
 
@@ -38,7 +38,7 @@ def test_a_gain_and_its_interval_are_those_of_linear_least_squares():
     shape = rng.standard_normal(12)
     values = 1.7 * shape + 0.05 * rng.standard_normal(12)
     asked = problem_of(values, lambda v: v["gain"] * shape, 0.05, ["gain=0.5:4"])
-    found = solve(asked, 2, 0, silent)
+    found = minimise(asked, 2, 0, silent)
     (estimate,) = intervals(found).estimates
     best = values @ shape / (shape @ shape)
     assert found.converged
@@ -56,7 +56,7 @@ def test_correlation_of_a_straight_line_is_the_closed_form():
         values, lambda v: v["offset_x_mm"] + v["offset_y_mm"] * x, 1.0,
         ("offset_x_mm=-1:1", "offset_y_mm=-1:1"), is_known=False,
     )  # fmt: skip
-    found = solve(asked, 3, 0, silent)
+    found = minimise(asked, 3, 0, silent)
     expected = -x.mean() / np.sqrt((x**2).mean())
     assert intervals(found).correlations[0, 1] == pytest.approx(expected, abs=1e-6)
     slope, intercept = np.polyfit(x, values, 1)
@@ -68,7 +68,7 @@ def test_an_interval_over_which_the_model_bends_is_approximate():
     values = 0.01 + 0.0447 * np.tile([1.0, -1.0], 15)
     asked = problem_of(values, lambda v: v["offset_x_mm"] ** 2 + 0 * values, 0.0447,
                        ["offset_x_mm=-0.01:1.2"])  # fmt: skip
-    (estimate,) = intervals(solve(asked, 2, 0, silent)).estimates
+    (estimate,) = intervals(minimise(asked, 2, 0, silent)).estimates
     assert [estimate.low, estimate.high] == pytest.approx([0.02, 0.18], abs=0.005)
     assert estimate.is_curved
 
@@ -85,7 +85,7 @@ def test_a_misfit_counts_as_one_complex_error(given, freedom):
             is_known=given < 1,
         )  # fmt: skip
         asked = replace(asked, data=replace(asked.data, freedom=freedom))
-        found = intervals(solve(asked, 1, 0, silent))
+        found = intervals(minimise(asked, 1, 0, silent))
         (estimate,) = found.estimates
         assert found.unexplained == pytest.approx(m / np.hypot(1, m), rel=0.01)
         assert found.is_described == estimate.is_resolved == (m < 0.2)
@@ -100,7 +100,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     for _ in range(200):
         values = shape + 0.1 * rng.standard_normal(8)
         asked = problem_of(values, lambda v: v["gain"] * shape, 1.0, ["gain=0.5:4"], False)
-        (estimate,) = intervals(solve(asked, 1, 0, silent)).estimates
+        (estimate,) = intervals(minimise(asked, 1, 0, silent)).estimates
         inside += estimate.low <= 1.0 <= estimate.high
     assert 0.9 <= inside / 200 <= 0.99
 
@@ -163,7 +163,7 @@ def of_slow_wave(noise):
         1.3 * SHAPE + 0.1 * noise[:, 0], lambda v: shape @ [v["gain"], v["offset_x_mm"]], 0.1,
         ["gain=0.2:5", "offset_x_mm=-1:1"], kind="waveforms",
     )  # fmt: skip
-    return intervals(solve(asked, 1, 0, silent))
+    return intervals(minimise(asked, 1, 0, silent))
 
 
 def test_widening_of_a_mean_is_that_of_effective_samples():
@@ -218,9 +218,9 @@ def test_a_search_leaves_the_minimum_of_a_delay_a_period_off(modulus):
 
 def test_a_turned_sign_is_noticed():
     for sign in (1, -1):
-        assert solve(of_waves(TRUE, sign), 2, 0, silent).may_be_flipped == (sign < 0)
+        assert minimise(of_waves(TRUE, sign), 2, 0, silent).may_be_flipped == (sign < 0)
         vary = (VARY[0], "gain=-5:5", VARY[2])
-        found = solve(of_waves(TRUE | {"delay_ms": 0.1}, sign, vary), 2, 0, silent)
+        found = minimise(of_waves(TRUE | {"delay_ms": 0.1}, sign, vary), 2, 0, silent)
         assert found.may_be_flipped == (sign < 0)
 
 

@@ -15,9 +15,9 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import Body
 from skinwave.bodies.build import build, operators
 from skinwave.models import meshed, reduced
-from skinwave.models.meshed import axes_of_probes
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
+from skinwave.models.symmetry import axes_of_probes
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute, solve
 from skinwave.scene.file import loads

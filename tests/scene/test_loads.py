@@ -8,7 +8,7 @@ import pytest
 
 import fem
 import skinwave
-from fem.load_and_probe import facet_normals, load_operator, traction_operator
+from fem.load_and_probe import facet_normals, pressure_operator, traction_operator
 from meshes import block
 from simple_model import Material, MovingPressure, Stack, Tacton, Trajectory
 from simple_model.layers.flat_quantities import traction_field
@@ -130,7 +130,7 @@ def test_tractions_have_the_force_of_their_direction():
     tilted = np.broadcast_to([0.6, 0.0, -0.8], normals.shape)
     force = (traction_operator(mesh, tilted) @ np.full(len(normals), 7.0)).reshape(-1, 3)
     np.testing.assert_allclose(force.sum(axis=0), 7 * 0.02 * 0.03 * tilted[0], atol=1e-15)
-    inwards = traction_operator(mesh, -normals) - load_operator(mesh)
+    inwards = traction_operator(mesh, -normals) - pressure_operator(mesh)
     assert abs(inwards).max() < 1e-18
 
 

@@ -298,7 +298,7 @@ def closed_form(w):
 @pytest.fixture(scope="module")
 def element():
     mesh = meshes.block((0.01, 0.01, 0.01), 0.01)
-    P = fem.load_operator(mesh)
+    P = fem.pressure_operator(mesh)
     return mesh, P @ np.ones(P.shape[1]), fem.probe_operator(mesh, [[0.0, 0.0]])
 
 

@@ -31,7 +31,7 @@ SCENE = skinwave.Scene(
 @pytest.fixture(scope="module")
 def block():
     mesh = meshes.block((0.03, 0.03, 0.01), 0.005)
-    points, P = fem.facet_points(mesh)[:, :2], fem.load_operator(mesh)
+    points, P = fem.facet_points(mesh)[:, :2], fem.pressure_operator(mesh)
     force = P @ np.exp(-(points**2).sum(axis=1) / 2 / 0.00435**2)
     return mesh, force, fem.probe_operator(mesh, [[0.0, 0.0], [0.005, 0.0]])
 
@@ -76,7 +76,7 @@ def test_layers_relax_each_in_its_own_time():
 def test_reduced_motion_from_rest_is_that_of_the_transient():
     mesh = meshes.block((0.03, 0.03, 0.01), 0.005)
     ops = fem.assemble(mesh, ZENER, absorbing="sides")
-    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    P, points = fem.pressure_operator(mesh), fem.facet_points(mesh)[:, :2]
     S = fem.probe_operator(mesh, [[0.0, 0.0], [0.005, 0.0], [0.01, 0.0]])
     load = replace(LOAD, drive="linear")  # which begins at 0: a jump would ask for smaller steps
     path = load.tacton.trajectory
