@@ -37,8 +37,6 @@ from fem.typing import Complex, Floats, Ints
 from meshes import TetMesh
 from simple_model.layers.material import Material
 
-OF_AIR = ("fluid", *RESISTANCES)
-KINDS = ("stiffness", "mass", "dashpots", "layer", "springs", *OF_AIR)  # of terms
 RESTART, CYCLES = 60, 5  # of GMRES
 
 Terms = tuple[tuple[str, int], ...]
@@ -93,7 +91,8 @@ class AffineOperators:
 
     def in_vacuum(self) -> "AffineOperators":
         """Return the sparse operators, without air."""
-        dry = [q for q, (kind, _) in enumerate(self.terms) if kind not in OF_AIR]
+        of_air = ("fluid", *RESISTANCES)
+        dry = [q for q, (kind, _) in enumerate(self.terms) if kind not in of_air]
         terms, parts = (tuple(each[q] for q in dry) for each in (self.terms, self.parts))
         return replace(self, terms=terms, parts=parts)
 

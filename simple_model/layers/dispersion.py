@@ -22,7 +22,6 @@ from simple_model.layers.thin_layers import eigenpairs, outgoing, pencil
 from simple_model.typing import Bools, Complex, Floats
 
 KINDS = ("propagating", "backward", "leaky", "evanescent")
-MOST = 6  # modes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,9 +124,7 @@ class DispersionCurves:
     modes: tuple[Mode, ...]
 
 
-def dispersion_curves(
-    stack: Stack, frequencies: ArrayLike, *, most: int = MOST
-) -> DispersionCurves:
+def dispersion_curves(stack: Stack, frequencies: ArrayLike, *, most: int = 6) -> DispersionCurves:
     """Compute the dispersion curves of a stack of layers.
 
     Finite stacks use the thin-layer method. Layers on a half-space use the same with a perfectly

@@ -26,7 +26,6 @@ from simple_model.typing import Complex, Floats
 
 ModulusLaw = Callable[[Any], Any]  # complex shear modulus in Pa at angular frequencies in rad/s
 
-BAND = (1.0, 2000.0)  # Hz: lines of loads, and modes that they excite
 FIT_TOLERANCE = 0.005  # relative deviation of a series; motion near resonances deviates more
 
 
@@ -92,7 +91,7 @@ class PronySeries:
 def fit_prony(
     law: ModulusLaw,
     *,
-    band: tuple[float, float] = BAND,
+    band: tuple[float, float] = (1.0, 2000.0),
     rest: float | None = None,
     frequencies: tuple[float, ...] = (),
     tolerance: float = FIT_TOLERANCE,
@@ -103,7 +102,7 @@ def fit_prony(
     Parameters
     ----------
     law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa
-    band : lowest and highest frequency in Hz
+    band : lowest and highest frequency in Hz; by default of lines of loads and their modes
     rest : float, Pa, modulus at rest; fitted if not given
     frequencies : Hz, within the band, fitted in addition to log-spaced ones
     tolerance : float, largest relative deviation |series - law| / |law|

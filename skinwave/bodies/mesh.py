@@ -12,8 +12,6 @@ from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.tissue import hand_size, in_tissue_layers
 from skinwave.typing import Ints
 
-NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of that of the focal spot
-
 
 def discretise(body: Body, h: float) -> Discretised:
     """Return ten-node tetrahedra about the middle of a hand, growing away from it.
@@ -51,6 +49,6 @@ register(
         default_size=hand_size,
         is_bounded=False,
         may_be_coated=True,
-        normal_patch=NORMAL_PATCH,
+        normal_patch=3e-3,  # m, standard deviation: two thirds of that of the focal spot
     )
 )

@@ -25,8 +25,6 @@ from skinwave.scene.variation import with_values
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
-STARTS = 8
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
@@ -84,7 +82,7 @@ def fit(
     tie: Sequence[str] = (),
     kind: str = "",
     model: str = "auto",
-    starts: int = STARTS,
+    starts: int = 8,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Fit:

@@ -178,8 +178,7 @@ def _fit_lines(x: Floats, start: Floats, rate: float, floor: Floats, runs: int) 
     largest_step = 0.5  # bins
     frequencies, limit = start.copy(), largest_step * rate / len(x)
     noise = np.tile(floor[_bins(start, x, floor, rate)], (1, runs))
-    most_steps = 12  # of Gauss-Newton
-    last_step = 0.01  # of a standard error or of `largest_step`
+    most_steps, last_step = 12, 0.01  # of Gauss-Newton; of a standard error or of `largest_step`
     for _ in range(most_steps):
         step, errors, linear, rest = _step(x, frequencies, rate, noise)
         if (np.abs(step) < last_step * np.minimum(errors, limit)).all():

@@ -67,8 +67,7 @@ def _bands(knots: np.ndarray, bins: np.ndarray) -> np.ndarray:
 
 
 def _half_width(k: np.ndarray) -> np.ndarray:
-    half_band = 0.25  # of the frequency: half-width of the band of the median
-    widest = 400  # bins
+    half_band, widest = 0.25, 400  # half-width of the band over the frequency; bins
     return np.clip(half_band * k, FEWEST, widest).astype(int)
 
 

@@ -22,9 +22,6 @@ from skinwave.system.effort import Progress
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.typing import Floats
 
-MOST_EVALUATIONS = 40  # of one local search
-ROUGH_TOLERANCE = 1e-5  # of chi squared
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
@@ -219,9 +216,7 @@ def _scan_minima(problem: Problem, local: Start, k: int) -> list[Floats]:
     return [scan[n][1] for n in sorted(new, key=lambda n: scan[n][0])]
 
 
-def refine(
-    problem: Problem, u: Floats, most: int = MOST_EVALUATIONS, tolerance: float = ROUGH_TOLERANCE
-) -> Start:
+def refine(problem: Problem, u: Floats, most: int = 40, tolerance: float = 1e-5) -> Start:
     """Search locally from a point (k,) to a relative tolerance of chi squared."""
     result = least_squares(
         problem.residual, np.clip(u, 1e-6, 1 - 1e-6), problem.forward_slopes, bounds=(0, 1),

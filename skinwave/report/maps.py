@@ -75,9 +75,8 @@ def surfaces_figure(
     side, alone_size = 3.85, 5.0  # inch: of a map with its bar, of one map
     figure, axes = panels(len(surfaces), style, alone_size if alone else side)
     entries: dict[str, Any] = _path_entry(scene, "white")
-    threshold = "#ff2fd0"  # of the line of the detection threshold
     raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-    kernel_colour = "#ff9e4a"  # of the line of the kernel's -20 dB
+    orange, pink = "#ff9e4a", "#ff2fd0"  # the kernel's -20 dB, the detection threshold
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
         quantity, power = surface.quantity, _power_of_ten(surface.unit_rms)
         shown = np.maximum(_finer(surface.unit_rms), 0.0) / 10.0**power
@@ -90,16 +89,14 @@ def surfaces_figure(
         ax.set(xlim=(left, right), ylim=(low, high))
         borders = [(surface, NEAR, "white", "solid", f"{NEAR:g} dB")]
         if kernel is not None:
-            borders.insert(
-                0, (kernel, OUTSIDE, kernel_colour, "dashed", f"kernel's {OUTSIDE:g} dB")
-            )
+            borders.insert(0, (kernel, OUTSIDE, orange, "dashed", f"kernel's {OUTSIDE:g} dB"))
         for field, drop, colour, dashes, name in borders:
             level = np.nanmax(field.rms) * 10 ** (drop / 20)
             if _draw_border(ax, field, field.rms, level, colour, dashes):
                 entries[name] = {**_outlined(colour), "ls": dashes}
         level_map = surface.level
-        if level_map is not None and _draw_border(ax, surface, level_map, 0.0, threshold, "solid"):
-            entries["detection threshold"] = {"color": threshold, "ls": "solid"}
+        if level_map is not None and _draw_border(ax, surface, level_map, 0.0, pink, "solid"):
+            entries["detection threshold"] = {"color": pink, "ls": "solid"}
         draw_path(ax, scene, "white")
         extend = _draw_measured(ax, surface, image, measured, power) if measured else "neither"
         note = f" ({surface.note})" * bool(surface.note and not alone)

@@ -134,10 +134,9 @@ def draw_scene(scene: "Scene", ax: "Axes | None") -> "Axes":
     """Draw body, path, foci at the start and probes from above, in mm."""
     ax, path = drawing.new_axes(ax), scene.tacton.trajectory
     _draw_body(ax, scene.body)
-    path_colour = "#222222"
     if not path.is_static:
         x, y = 1e3 * path.at_phase(np.linspace(0, 1, 721)).T
-        ax.plot(x, y, color=path_colour, lw=1.2, ls="dotted", label="path")
+        ax.plot(x, y, color="#222222", lw=1.2, ls="dotted", label="path")
     _draw_foci(ax, scene)
     x, y = 1e3 * scene.probe_points.T
     probe = "#0072B2"
@@ -171,20 +170,17 @@ def _draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
         return
     width, height = 1e3 * body.width, 1e3 * body.height
     radius = 1e3 * body.palm.corner_radius if "relief" in body.of_kind.keys else 0.0
-    body_colour = "#e8d5c4"
+    skin = "#e8d5c4"
     outline = FancyBboxPatch(
         (-width / 2, -height / 2), width, height,
         f"round,pad=0,rounding_size={radius}" if radius else "square,pad=0",
-        facecolor="none" if symmetry else body_colour, edgecolor="0.4",
-        label=body.of_kind.words(body),
+        facecolor="none" if symmetry else skin, edgecolor="0.4", label=body.of_kind.words(body),
     )  # fmt: skip
     ax.add_patch(outline)
     if symmetry:
         left, bottom = (0.0 if a in symmetry else -size / 2
                         for a, size in (("x", width), ("y", height)))  # fmt: skip
-        part = Rectangle(
-            (left, bottom), width / 2 - left, height / 2 - bottom, facecolor=body_colour
-        )
+        part = Rectangle((left, bottom), width / 2 - left, height / 2 - bottom, facecolor=skin)
         part.set_label("modelled part")
         ax.add_patch(part)
         part.set_clip_path(outline)
@@ -200,8 +196,7 @@ def _draw_foci(ax: "Axes", scene: "Scene") -> None:
     across = spot_reach * width * np.linspace(-1, 1, 81)
     grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
     shape = len(across), len(across)
-    focus = "#D55E00"
-    half = 0.5  # of the pressure at a focus, on its contour
+    focus, half = "#D55E00", 0.5  # colour of a contour, and part of the pressure at a focus
     for centre in tacton.trajectory.at_phase(phases):
         places = grid + centre
         spot = scene.pressure.spot(places, centre).reshape(shape)

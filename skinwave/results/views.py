@@ -109,7 +109,7 @@ class View:
 
 
 def fastest_line(moved: BodyMotion) -> float:
-    """Return the highest frequency in Hz that moves a body by `strong_line_ratio` or more."""
+    """Return the highest frequency in Hz that moves a body by a tenth of its largest or more."""
     lines, basis = oscillating(moved.motion), moved.own_basis
     power = np.einsum("fm,mn,fn->f", lines.lines.conj(), basis.T @ basis, lines.lines).real
     strong_line_ratio = 0.1  # to the strongest line: weaker lines need no frames of their own
@@ -246,17 +246,12 @@ def save(path: Path, view: View) -> None:
 
 def load(path: Path) -> View:
     """Read a view from an npz file; raises a ValueError if the file holds something else."""
-    meta_types = {
-        "body": str,
-        "model": str,
-        "quantity": str,
-        "period": float,
-        "tone": float,
-        "scene": str,
-    }
+    types = {
+        "body": str, "model": str, "quantity": str, "period": float, "tone": float, "scene": str,
+    }  # fmt: skip
     try:
         arrays = reading.load_arrays(path)
-        meta: dict[str, Any] = fitting(json.loads(str(arrays["meta"])), meta_types, "meta")
+        meta: dict[str, Any] = fitting(json.loads(str(arrays["meta"])), types, "meta")
         stored = {name: arrays[name] for name in SHAPES if name in arrays}
         _check_arrays(stored)
         if not (len(stored["points"]) and len(stored["surface"]) and meta["period"] > 0):

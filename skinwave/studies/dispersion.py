@@ -29,8 +29,6 @@ from skinwave.system.document import Details, Part, Report, preformat
 from skinwave.system.table import Column, Table
 
 LOWEST, HIGHEST = 10.0, 650.0  # Hz
-FREQUENCIES = 48  # between these, in addition to those of the lines
-MODES = 6
 LINE_COLUMNS = (
     "line", Column("frequency_hz", "frequency", "Hz", 4), Column("pressure_pa", "pressure", "Pa"),
     Column("mode", "driven mode"), "kind", Column("share", digits=2),
@@ -109,7 +107,7 @@ class DrivenModes:
 
 
 def driven_modes(
-    scene: Scene, *, highest: float = HIGHEST, spacing: int = FREQUENCIES, most: int = MODES
+    scene: Scene, *, highest: float = HIGHEST, spacing: int = 48, most: int = 6
 ) -> DrivenModes:
     """Return curves of `most` modes of a scene's body up to the `highest` frequency in Hz.
 

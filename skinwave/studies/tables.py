@@ -227,12 +227,12 @@ def effort_table(
     text = f"{plural(tactons, 'Tacton')}: {significant(spent, 2)} s"
     text += f", at most {peak:.2f} GiB in one process" * bool(peak)
     error_rule = "The squares of the parts add, because their causes are independent."
-    error_columns = (
+    columns = (
         "body",
         "expected error of the waveform at the worst probe",
         "cure of the largest part",
     )
-    parts: list[Part] = [Table(error_columns, errors), error_rule] if errors else []
+    parts: list[Part] = [Table(columns, errors), error_rule] if errors else []
     effort_columns = (
         "body", "degrees of freedom", "reduced to", Column("estimated reduction error", digits=2),
         Column("relative energy imbalance", digits=1), "radiated share of loss", "solver",

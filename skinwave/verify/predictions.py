@@ -155,7 +155,6 @@ def peak(x: Floats, y: Floats) -> float:
 
 
 HAND_SIZE = 6.5e-3  # m, of elements: 5 and 8 mm change the 1/e lengths by up to 8 %
-HAND_FREQUENCIES = (200.0, 300.0, 400.0)  # Hz
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,7 +167,7 @@ class Finger:
 
 
 def along_finger(
-    file: Path, report: Progress, frequencies: tuple[float, ...] = HAND_FREQUENCIES
+    file: Path, report: Progress, frequencies: tuple[float, ...] = (200.0, 300.0, 400.0)
 ) -> Finger:
     """Return the decay on the palmar side of the longest finger of a hand, by finite elements.
 
