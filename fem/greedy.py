@@ -77,13 +77,16 @@ def reduce_affine(
     tolerance: float,
     solver: str,
     progress: Callable[[float], None],
+    most_bases: int = 6,
+    nested: float = 3 / 4,
 ) -> tuple[AffineModel, float, int]:
     """Return a model for all variants of a range, the largest relative error at a line of the full
     body, and the number of factorisations.
 
     Other variants are interpolated between the geometries (g,). Materials of the training set have
     no modulus laws. Errors are checked at lines with frequencies (f,) in Hz. `band` and `solver`
-    are those of `reduce`. Raises a ValueError if `most_bases` variants are not enough.
+    are those of `reduce`; `nested` is the share of vectors in the smaller basis, from which the
+    change is computed. Raises a ValueError if `most_bases` variants are not enough.
     """
     t = min(range(len(training)), key=lambda each: _loss(training[each].solids))
     first = training[t].geometry()
@@ -91,8 +94,6 @@ def reduce_affine(
     basis, visited, checked = np.zeros((len(first.affine.free), 0)), set[int](), 0
     parts = np.zeros((len(geometries), len(first.affine.parts), 0, 0))
     errors: dict[int, float] = {}
-    nested = 3 / 4  # of the vectors: the smaller basis, from which the change is computed
-    most_bases = 6
     for step in range(min(most_bases, len(training))):
         visited.add(t)
         full = training[t].geometry()
@@ -237,22 +238,25 @@ def line_bases(
     shares: Floats,
     tolerance: float,
     progress: Callable[[float], None],
+    *,
+    most_states: int = 80,
+    in_a_row: int = 3,
+    settled: float = 0.1,
 ) -> tuple[tuple[AffineModel, ...], float]:
     """Return a model of each line (f,), in the coordinates of the given model, for materials like
     those of a training set, and the largest error of the last comparisons.
 
     `weights` (t, f, q) are those of the terms for each material and line, `shares` (t, g) those of
-    its geometries. Raises a ValueError if `most_states` are not enough.
+    its geometries. The search ends after `in_a_row` predictions within the tolerance. Lines with
+    less than the share `settled` of it need no further state. Raises a ValueError if `most_states`
+    of a line are not enough.
     """
     lines = range(model.forces.shape[1])
     nothing = np.zeros((model.parts.shape[-1], 0))
     bases, errors = [_of_line(model, k, nothing) for k in lines], []
     before = np.zeros((len(weights), len(bases), model.outputs.shape[1]), complex)
     changes, left = np.zeros(len(weights)), np.ones(len(weights), bool)
-    in_a_row = 3  # predictions within the tolerance that end the search
     expected_states = 25  # of one line, for the progress
-    settled = 0.1  # of the tolerance: lines with less error need no further state
-    most_states = 80  # of one line
     for _ in range(min(most_states, len(weights))):
         t = int(np.argmax(np.where(left, changes, -1)))
         left[t] = False

@@ -162,7 +162,6 @@ def row_starts_of(kept: Bools, indptr: NDArray[np.integer[Any]]) -> Index:
     return before[indptr]
 
 
-def slabs(count: int) -> list[slice]:
-    """Return slices of `at_once` elements each."""
-    at_once = 256  # elements at a time, so that temporaries stay in the processor's cache
+def slabs(count: int, at_once: int = 256) -> list[slice]:
+    """Return slices of `at_once` elements, whose temporaries stay in the processor's cache."""
     return [slice(start, start + at_once) for start in range(0, count, at_once)]

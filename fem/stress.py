@@ -15,7 +15,7 @@ node has the mean of its two ends. Nodes between two materials have one value in
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from typing import Any
@@ -176,17 +176,18 @@ def _size(mesh: TetMesh, patch: Ints) -> Floats:
     return np.asarray(np.ptp(mesh.points[mesh.tets[patch, :4]], axis=1).mean(axis=0))
 
 
-def fitted_polynomial(x: Floats) -> tuple[Floats, int]:
+def fitted_polynomial(
+    x: Floats, degrees: Sequence[int] = (3, 2, 1, 0), locality: float = 1.0
+) -> tuple[Floats, int]:
     """Fit a polynomial to samples at places x (s, 2 or 3), in element sizes from a point.
 
-    The degree is the highest of `degrees` with half as many coefficients as samples. Returns the
+    The degree is the highest of `degrees` with half as many coefficients as samples. A sample d
+    elements from the point has the weight exp(-locality d^2); 0.7 to 5 were tried. Returns the
     coefficients (n, s) of `polynomials` per value of each sample, first the value at the point, and
     the degree.
     """
-    locality = 1.0  # of the weight exp(-locality d^2) at d elements; 0.7 to 5 tried
     root = np.exp(-locality / 2 * (x**2).sum(axis=1))  # of the weights
     independent = 1e-8  # of the largest singular value
-    degrees = (3, 2, 1, 0)  # of polynomials; the highest that the samples determine is used
     for degree in degrees:
         fitted = root[:, None] * polynomials(x, degree)
         left, sizes, right = np.linalg.svd(fitted, full_matrices=False)

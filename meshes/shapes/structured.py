@@ -333,13 +333,14 @@ def _cells(length: float, h: float, *, least: int = 2) -> Floats:
     return np.linspace(-length / 2, length / 2, least * max(1, round_up(length / (least * h))) + 1)
 
 
-def check_size(cells: Iterable[float], order: int = 2) -> None:
-    """Refuse numbers of cells along the three axes that give more than `most_unknowns`."""
+def check_size(cells: Iterable[float], order: int = 2, most: int = 3_000_000) -> None:
+    """Refuse numbers of cells along the three axes that give more than `most` degrees of freedom,
+    by default as many as a workstation can factorise.
+    """
     unknowns = 3.0 * prod(order * n + 1 for n in cells)
-    most_unknowns = 3_000_000  # degrees of freedom whose factorisation fits in a workstation
-    if not unknowns <= most_unknowns:
+    if not unknowns <= most:
         raise MeshError(
-            f"{unknowns:.2g} or more degrees of freedom exceed the limit of {most_unknowns:,}; "
+            f"{unknowns:.2g} or more degrees of freedom exceed the limit of {most:,}; "
             "use larger elements or a smaller body"
         )
 

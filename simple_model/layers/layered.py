@@ -159,14 +159,13 @@ def _resonance(
     return total
 
 
-def _decay(stack: Stack, w: Complex) -> Floats:
+def _decay(stack: Stack, w: Complex, weakest: float = 0.1) -> Floats:
     """Smallest decay (f,) in 1/m of shear waves; `weakest` of the mean if a layer is lossless."""
     waves = [np.sqrt(m.density * w**2 / _shear(m, w)) for m in stack.materials]
     decay = np.abs(np.imag(waves))
     finite = [thickness for thickness in stack.thicknesses if isfinite(thickness)]
     share = np.minimum(stack.thicknesses, sum(finite))  # a half-space counts as all above it
     share = share / share.sum()
-    weakest = 0.1  # of the mean decay: decay of a mode that is mostly in a layer without loss
     return np.where((decay > 0).all(axis=0), decay.min(axis=0), weakest * (share @ decay))
 
 

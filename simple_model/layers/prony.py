@@ -142,9 +142,10 @@ def fit_prony(
     return next(series for series in candidates if series.error <= enough)
 
 
-def check_modulus(frequencies: Floats, moduli: Complex) -> None:
+def check_modulus(frequencies: Floats, moduli: Complex, largest: float = 0.10) -> None:
     """Refuse complex moduli (f,) in Pa at ascending frequencies (f,) in Hz unless they are passive
-    and causal. Causal moduli are close to a series of non-negative terms (`causal`).
+    and causal. The relative distance of causal moduli from a series of non-negative terms is at
+    most `largest` (root mean square).
     """
     check_passive(frequencies, moduli)
     w = 2 * np.pi * frequencies
@@ -154,11 +155,10 @@ def check_modulus(frequencies: Floats, moduli: Complex) -> None:
     # Measured moduli with random errors of 5 % in both parts are 7 % from every causal law; a
     # hysteretic loss factor of 0.2 is 10 % away, of 0.3 15 %. The limit applies to the root mean
     # square, so single outliers pass; a warning states their size.
-    causal = 0.10
-    if mean > causal:
+    if mean > largest:
         raise ValueError(
             f"the complex modulus is not causal: it differs by {100 * mean:.0f} % from the nearest "
-            f"relaxing solid (root mean square; the limit is {100 * causal:g} %), at "
+            f"relaxing solid (root mean square; the limit is {100 * largest:g} %), at "
             f"{frequencies[worst]:.3g} Hz by {100 * away[worst]:.0f} %; the storage modulus must "
             "rise where the loss modulus is large: check both, or give a loss_factor"
         )
@@ -213,9 +213,11 @@ def fitted_series(
 
 
 @lru_cache(maxsize=1024)
-def constant_loss(loss_factor: float) -> PronySeries:
+def constant_loss(
+    loss_factor: float, reference: float = 150.0, loss_band: tuple[float, float] = (10.0, 2000.0)
+) -> PronySeries:
     """Return the modulus law of a nearly constant loss factor above 0, relative to the storage
-    modulus at `reference`.
+    modulus at the frequency `reference` in Hz.
 
     A modulus mu (1 + i eta) with one eta at all frequencies is not causal. The solid of constant
     loss factor eta has the modulus
@@ -225,13 +227,11 @@ def constant_loss(loss_factor: float) -> PronySeries:
     (Kjartansson, J Geophys Res 84:4737 (1979), doi 10.1029/JB084iB09p04737), which is 0 at rest. A
     few Maxwell branches with log-spaced times approximate it over a band and have a modulus at rest
     (Emmerich and Korn, Geophysics 52:1252 (1987), doi 10.1190/1.1442386). They define the loss
-    factor in every model: eta within 2.5 % over `loss_band` up to eta = 2, within 10 % beyond, half
-    of it at 3 Hz, and 0 at rest, where the modulus is 0.92, 0.76 and 0.35 mu for eta = 0.03, 0.1
-    and 0.4.
+    factor in every model: eta within 2.5 % over `loss_band` in Hz up to eta = 2, within 10 %
+    beyond, half of it at 3 Hz, and 0 at rest, where the modulus is 0.92, 0.76 and 0.35 mu for eta =
+    0.03, 0.1 and 0.4.
     """
     loss_frequencies = 93  # at which the series is fitted
-    reference = 150.0  # Hz, where the storage modulus is the given one
-    loss_band = (10.0, 2000.0)  # Hz, where the loss factor is nearly constant
     w, w_0 = 2 * np.pi * np.geomspace(*loss_band, loss_frequencies), 2 * np.pi * reference
     power = 2 / np.pi * np.arctan(loss_factor)
     exact = (1j * w / w_0) ** power / np.cos(np.pi * power / 2)

@@ -176,13 +176,15 @@ class PlateModes:
         return np.concatenate(each, axis=2).reshape(len(x) * len(y), -1)
 
 
-def plate_modes(plate: Plate, finest: float | Sequence[float] = 350.0) -> PlateModes:
+def plate_modes(
+    plate: Plate, finest: float | Sequence[float] = 350.0, most_dofs: int = 6000
+) -> PlateModes:
     """Compute all modes of a plate that polynomials up to the wavenumber `finest` in rad/m
     represent.
 
     `finest` may differ along x and y; beyond its default, a focal spot of 4.35 mm has a third of
-    its force. The lowest modes are accurate; the highest only complete the
-    static deflection. Raises a ValueError for more than `most_dofs` degrees of freedom.
+    its force. The lowest modes are accurate; the highest only complete the static deflection.
+    Raises a ValueError for more than `most_dofs` degrees of freedom of one symmetry.
 
     >>> stiffness = {"d11": 4e-4, "d22": 4e-4, "d12": 1.2e-4, "d66": 1.4e-4}
     >>> plate = Plate(size_x=0.1, size_y=0.1, mass_per_area=0.08, **stiffness)
@@ -191,7 +193,6 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = 350.0) -> PlateM
     """
     resolved, mirrored = np.broadcast_to(finest, 2), _symmetries(plate)
     bases = [_line_bases(plate, axis, resolved[axis], mirrored[axis]) for axis in (0, 1)]
-    most_dofs = 6000  # of one symmetry, for some minutes
     if (dofs := max(x.size * y.size for x, y in product(*bases))) > most_dofs:
         raise ValueError(
             f"a plate of {1e3 * plate.size_x:g} by {1e3 * plate.size_y:g} mm needs {dofs:,} "

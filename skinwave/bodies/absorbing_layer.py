@@ -32,20 +32,20 @@ def has_layer(body: Body) -> bool:
     return body.of_kind.is_layer and "absorbing" in (body.base, *body.conditions)
 
 
-def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
+def layer_of(body: Body, wider: float = 1.0, lowest_cut_on: float = 80.0) -> AbsorbingLayer:
     """Return the absorbing layer of a slab; `wider` multiplies its width to estimate its
     reflections.
 
     Dashpots alone reflect a quarter of a shear wave at 30 degrees. Lengths are multiples of the
-    depth, or of the depth whose first mode cuts on at `lowest_cut_on` if that is smaller. On a
-    rigid base, waves are long near the cut-on and decay below it. A plane slab of 50 mm then
-    reflects at most 1.4 % of the motion at the focus at any line, compared with 17 % for dashpots
-    alone (`skinwave.verify.waves`). With a free or elastic base, bending waves propagate at all
+    depth, or of the depth whose first mode cuts on at `lowest_cut_on` in Hz if that is smaller:
+    below it, the motion of deeper slabs is near field at their sides. On a rigid base, waves are
+    long near the cut-on and decay below it. A plane slab of 50 mm then reflects at most 1.4 % of
+    the motion at the focus at any line, compared with 17 % for dashpots alone
+    (`skinwave.verify.waves`). With a free or elastic base, bending waves propagate at all
     frequencies, and only the layer damps them. Above an absorbing base, waves are spherical, with
     the wavelength of the lowest material.
     """
     speed = body.solid.shear_speed
-    lowest_cut_on = 80.0  # Hz: motion of deeper slabs below it is near field at their sides
     longest = speed / (4 * lowest_cut_on)
     scale = longest if body.base == "absorbing" else min(body.depth, longest)
     # Width and coarsest cell over that scale; damping over the angular frequency of cut-on.

@@ -17,7 +17,7 @@ from skinwave.typing import Floats, Ints
 THINNEST = 1e-6  # m: shorter pieces of a vertical line are round-off
 
 
-def flattened(body: Body, places: Floats, h: float) -> Body:
+def flattened(body: Body, places: Floats, h: float, rigid: float = 100.0) -> Body:
     """Return a flat body without reflecting sides, with the strata of a body under the focus.
 
     Solids become a slab with absorbing sides. Palms and discs are everywhere as deep as in their
@@ -33,7 +33,6 @@ def flattened(body: Body, places: Floats, h: float) -> Body:
     width, height = np.maximum([body.width, body.height], 2 * np.abs(places).max(axis=0)).tolist()
     base, stiffness, depth = body.base, body.base_stiffness, body.depth
     layers, material = body.layers, body.material
-    rigid = 100.0  # shear modulus over that of the tissue above, from which a stratum holds it
     if "regions" in body.of_kind.keys:
         column = _column(body, places[0], h)
         moduli = [solid.shear_modulus + solid.fast_modulus for _, solid in column]

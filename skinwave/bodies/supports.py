@@ -281,10 +281,11 @@ def supported_components(mounting: Mounting, mesh: TetMesh) -> Bools:
     return held
 
 
-def _clip_nodes(mesh: TetMesh, clip: Sequence[float], radius: float) -> Bools:
-    """Nodes (n,) in a clip: those in its square, and in the `fewest_columns` nearest columns."""
+def _clip_nodes(mesh: TetMesh, clip: Sequence[float], radius: float, fewest: int = 3) -> Bools:
+    """Nodes (n,) in a clip: those in its square, and in the `fewest` nearest columns, between which
+    the sheet cannot turn.
+    """
     away = np.abs(mesh.points[:, :2] - clip).max(axis=1)
     top = np.unique(mesh.facets["top"])
-    fewest_columns = 3  # of nodes in a clip: fewer let the sheet turn about it
-    reach = np.partition(away[top], fewest_columns - 1)[fewest_columns - 1]
+    reach = np.partition(away[top], fewest - 1)[fewest - 1]
     return away <= max(radius, reach) * (1 + NEARLY)

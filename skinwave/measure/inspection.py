@@ -110,6 +110,7 @@ def unsteady(
     frequencies: Floats,
     errors: Floats,
     least: float = 0.0,
+    turn_errors: float = 2.0,
 ) -> list[str]:
     """Return a sentence, without a full stop, if a line of waveforms changes between both halves.
 
@@ -135,7 +136,6 @@ def unsteady(
     turn = np.pi * (1 - SETTLE) * count / measured.rate * errors
     unsteady_chance = 0.01  # that a steady motion is called unsteady
     is_sure = (holm(both.p_values(change)) < unsteady_chance).any(axis=1)
-    turn_errors = 2.0  # standard errors of a frequency, whose turn of phase is ignored
     beyond = np.flatnonzero(is_sure & (share > np.maximum(turn_errors * turn, least)))
     if not len(beyond):
         return []

@@ -85,8 +85,8 @@ def stretching_error(scene: Scene, model: Model, tolerance: float) -> float:
 
 def _stretching_bound(scene: Scene, negligible: float) -> float:
     """Return a bound of the relative error of linear bending at small deflection, no sharper than
-    to decide whether it is negligible: stretching raises natural frequencies by at most `hardening`
-    (w / h)^2, and a resonance multiplies this.
+    to decide whether it is negligible: stretching raises natural frequencies by at most
+    2.6 (w / h)^2, and a resonance multiplies this.
     """
     squared, plain = linear_deflection(scene) ** 2, _displacement_scene(scene)
     # Relative error of linear bending over (w / h)^2 away from a resonance: 0.4 to 3.3 for paper

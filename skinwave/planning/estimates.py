@@ -77,8 +77,8 @@ def side_reflections(scene: Scene) -> float:
     body, at most `NO_BOUND`, which also stands for unknown reflections.
 
     The reflection of a side at a probe is the motion of an infinite body at the mirror image of the
-    probe. The estimate is the root of the four energies times `in_phase`, because reflections may
-    be in phase, and times up to `overdamped` where shear waves cannot oscillate. Absorbing sides do
+    probe. The estimate is the root of the four energies times 2, because reflections may be in
+    phase, and times up to 1.5 where shear waves cannot oscillate. Absorbing sides do
     not reflect, and a half-space has no sides.
     """
     body, probes = scene.body, scene.probe_points

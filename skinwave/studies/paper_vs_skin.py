@@ -135,7 +135,7 @@ def _ratio(later: Response) -> float:
 
 
 def load_ratios() -> dict[str, tuple[float, ...]]:
-    """Return the amplitudes at 2f, 3f and 4f relative to that at f, for each of `by_name`."""
+    """Return the amplitudes at 2f, 3f and 4f relative to that at f, for each law of the load."""
     m = np.sin(2 * np.pi * (np.arange(4096) + 0.5) / 4096)
     # Loads over one period of the modulation m = sin, relative to the largest. Each has its own
     # ratios 2f/f, 3f/f and 4f/f, before the response of the body changes them.

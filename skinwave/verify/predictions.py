@@ -167,18 +167,20 @@ class Finger:
 
 
 def along_finger(
-    file: Path, report: Progress, frequencies: tuple[float, ...] = (200.0, 300.0, 400.0)
+    file: Path,
+    report: Progress,
+    frequencies: tuple[float, ...] = (200.0, 300.0, 400.0),
+    up: str = "-x",
 ) -> Finger:
     """Return the decay on the palmar side of the longest finger of a hand, by finite elements.
 
-    The palm in the `file` faces `hand_up`. Raises a ValueError if the file is missing or contains
+    The palm in the `file` faces `up`. Raises a ValueError if the file is missing or contains
     no body.
     """
     if not file.is_file():
         raise ValueError(f"--hand {file} does not exist; give the mesh file of a hand")
     report("mesh the hand", 0.0)
-    hand_up = "-x"  # direction of the palm in the file of a hand
-    body = Body(kind="mesh", file=str(file), up=hand_up)
+    body = Body(kind="mesh", file=str(file), up=up)
     made = build(body, HAND_SIZE)
     # The tip is the point farthest from the middle; the wrist is on the side with most points.
     top = made.mesh.points[np.unique(made.mesh.facets["top"])][:, :2]
