@@ -26,7 +26,6 @@ from simple_model.choices import check_numbers
 from simple_model.layers.modulus_laws import FractionalKelvinVoigt, ModulusTable, ScaledLaw
 from simple_model.layers.prony import (
     FIT_TOLERANCE,
-    LARGEST_LOSS_FACTOR,
     ModulusLaw,
     PronySeries,
     PronyTerm,
@@ -141,9 +140,10 @@ class Material:
     def __post_init__(self) -> None:
         check_numbers("a material", self, "density", "shear_modulus")
         check_numbers("a material", self, "viscosity", "loss_factor", least="0 or above")
-        if self.loss_factor > LARGEST_LOSS_FACTOR:
+        largest_loss_factor = 10.0
+        if self.loss_factor > largest_loss_factor:
             raise ValueError(
-                f"loss_factor = {self.loss_factor:g} is above {LARGEST_LOSS_FACTOR:g}, more liquid "
+                f"loss_factor = {self.loss_factor:g} is above {largest_loss_factor:g}, more liquid "
                 "than solid; give a viscosity instead"
             )
         if not -1 < self.poisson < 0.5:

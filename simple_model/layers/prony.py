@@ -30,7 +30,6 @@ FIT_TOLERANCE = 0.005  # relative deviation of a series; motion near resonances 
 
 
 SLOWEST = 8.0  # Hz, 1 / (2 pi time)
-LARGEST_LOSS_FACTOR = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -75,9 +75,6 @@ class Loss:
         return np.asarray(self.rest + (self.shares * squared / (1 + squared)).sum(axis=-1))
 
 
-WITHOUT_LOSS = Loss(rest=1.0, lag=0.0, shares=np.zeros(0), times=np.ones(0))
-
-
 def free_modes(modes: PlateModes, material: Material) -> FreeModes:
     """Poles and residues of the modes of a plate whose material has no modulus law."""
     squared = np.maximum(modes.squared, np.finfo(float).tiny)

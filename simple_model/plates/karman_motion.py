@@ -37,7 +37,7 @@ from scipy.linalg.lapack import dposv
 from simple_model.layers.material import Material
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.spectrum import lines_from_rest, synthesise
-from simple_model.plates.free_modes import WITHOUT_LOSS, Loss, free_modes
+from simple_model.plates.free_modes import Loss, free_modes
 from simple_model.plates.modes import PlateModes, modal_motion, modal_motion_apart
 from simple_model.plates.path_forces import MIDDLE, modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
@@ -224,7 +224,8 @@ class _Scheme:
 
     @staticmethod
     def of(plate: KarmanPlate, dt: float, material: Material | None) -> _Scheme:
-        loss = Loss.of(material) if material else WITHOUT_LOSS
+        without_loss = Loss(rest=1.0, lag=0.0, shares=np.zeros(0), times=np.ones(0))
+        loss = Loss.of(material) if material else without_loss
         squared = np.maximum(plate.squared, 0.0)
         bending = np.diagonal(plate.bending) * (loss.storage(np.sqrt(squared)) - 1)
         half = np.sqrt(np.maximum(squared + bending, 0.0)) * dt / 2

@@ -14,7 +14,6 @@ from meshes import TetMesh
 from simple_model.layers.material import Material
 from skinwave.typing import Bools, Floats
 
-THINNEST = 0.5  # of an element that does not follow layers: the thinnest layer that it resolves
 Strata = Sequence[tuple[float, Material]]  # depth in m at which each begins, and its material
 
 

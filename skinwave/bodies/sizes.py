@@ -13,8 +13,11 @@ from fem.coat import Coat
 from simple_model.layers.material import Material
 from skinwave.bodies.analytic import has_exact_waves
 from skinwave.bodies.body import Body
-from skinwave.bodies.discretised import THINNEST, Strata
+from skinwave.bodies.discretised import Strata
 from skinwave.bodies.parts import solid_of
+
+THINNEST = 0.5  # of an element that does not follow layers: the thinnest layer that it resolves
+
 
 AT = 400.0  # Hz, the highest lines of Tactons
 

@@ -8,11 +8,6 @@ from scipy.special import fdtrc
 from simple_model.spectra import cosines
 from skinwave.typing import Floats
 
-NOT_SIMULTANEOUS = (
-    "the file has no reference for each place: places are taken as simultaneous, and phases "
-    "between them are wrong unless one trigger started all"
-)
-
 
 def correlation(
     frequencies: Floats, products: np.ndarray, delays: Floats, order: int = 0

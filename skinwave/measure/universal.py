@@ -13,7 +13,7 @@ import numpy as np
 
 from meshes import reading
 from skinwave.measure import units
-from skinwave.measure.delays import NOT_SIMULTANEOUS, align_by_references
+from skinwave.measure.delays import align_by_references
 from skinwave.measure.recording import Given, Recording, unknown_places
 from skinwave.system.formats import MEASUREMENTS, register
 from skinwave.typing import Floats
@@ -311,9 +311,13 @@ def _align(
     references = [one for one in others if len(one.y) == count and one.type == first.type]
     if len(references) == 1:
         return values, references[0].y, []
+    not_simultaneous = (
+        "the file has no reference for each place: places are taken as simultaneous, and phases "
+        "between them are wrong unless one trigger started all"
+    )
     if len(references) != runs * len(nodes):
         is_simultaneous = len(nodes) == 1 or (not first.is_in_time and first.type == RESPONSE)
-        return values, np.empty(0), [] if is_simultaneous else [NOT_SIMULTANEOUS]
+        return values, np.empty(0), [] if is_simultaneous else [not_simultaneous]
     by_node: dict[int, list[np.ndarray]] = {}
     for one in references:
         by_node.setdefault(one.at[0], []).append(one.y)

@@ -25,18 +25,6 @@ from skinwave.typing import Floats, Ints
 
 PIXELS = 201  # along a side of a snapshot
 MEASURED_EDGE = COLOURS["measured"]
-CAPTION = (
-    "Outside the dashed line the point kernel is below a tenth of its largest value; the body "
-    "moves there because waves propagate."
-)
-THRESHOLD_CAPTION = (
-    "Inside the pink line the strongest component is above the detection threshold of skin."
-)
-MEASURED_CAPTION = (
-    "Squares show the measured RMS in the colours of the map: the lines of the load, converted to "
-    "displacement, without gain. An arrow on a colour bar means that a measured value is larger. "
-    "On the kernel's map, a pressure, squares only show the places."
-)
 
 
 def rms_text(pressure: MovingPressure) -> str:

@@ -19,13 +19,6 @@ from skinwave.typing import Floats
 Effects = Mapping[str, Mapping[str, Propagation]]  # by Tacton and column
 NOT_SKIN = "thresholds are known of skin only"
 OF_PRESSURE = "none (a pressure)"
-ABOUT = (
-    "Medians over the Tactons, with the smallest and the largest value in brackets. In the picture "
-    "each dot is a Tacton, and a bar the median. Half of the motion: of the integral of squared "
-    "RMS. A reach ends at the edge of the map or of the body. The delay is that of the kernel's "
-    "strongest line in motion relative to pressure, at the probe nearest to the path, known up to "
-    "whole periods; below 0 the body is ahead."
-)
 HALF = "half of the motion within, from the path"
 
 

@@ -26,13 +26,7 @@ from skinwave.models import named
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report import description, render
 from skinwave.report.figures import REPORT, figure_file
-from skinwave.report.maps import (
-    CAPTION,
-    MEASURED_CAPTION,
-    THRESHOLD_CAPTION,
-    rms_text,
-    surfaces_figure,
-)
+from skinwave.report.maps import rms_text, surfaces_figure
 from skinwave.report.palette import label
 from skinwave.report.renderer import renderer
 from skinwave.report.spectra import levels_figure, strongest_probe, tacton_figure
@@ -170,6 +164,13 @@ def page_of(
     caveats = [*description.quantity_notes(runs[-1].scene), *description.unresolved_lines(runs)]
     parts: list[Part] = [contents(body), *caveats, *body]
     verdict: list[str] = []
+    about_numbers = (
+        "Medians over the Tactons, with the smallest and the largest value in brackets. In the "
+        "picture each dot is a Tacton, and a bar the median. Half of the motion: of the integral "
+        "of squared RMS. A reach ends at the edge of the map or of the body. The delay is that of "
+        "the kernel's strongest line in motion relative to pressure, at the probe nearest to the "
+        "path, known up to whole periods; below 0 the body is ahead."
+    )
     if first:
         if is_single:
             verdict = sentences(first)
@@ -177,7 +178,7 @@ def page_of(
         else:
             verdict = [*overview.sentences(effects, groups), *sentences(first)[1:]]
             dots = overview.figure(effects, gallery.style)
-            numbers = gallery.figure("numbers", dots, overview.ABOUT)
+            numbers = gallery.figure("numbers", dots, about_numbers)
             detail = Section(f"One of them: {first.kernel.tacton}", own)
             parts = [overview.table(effects), numbers, parts[0], *spatial, detail, *parts[1:]]
     verdict = [" ".join(verdict)] if verdict else []
@@ -361,14 +362,26 @@ def _caption(name: str, runs: Sequence[Run]) -> str:
 def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
     """Return the maps and the uncertainty of the numbers."""
     parts: list[Part] = []
+    beyond_kernel = (
+        "Outside the dashed line the point kernel is below a tenth of its largest value; the body "
+        "moves there because waves propagate."
+    )
+    threshold_caption = (
+        "Inside the pink line the strongest component is above the detection threshold of skin."
+    )
+    measured_caption = (
+        "Squares show the measured RMS in the colours of the map: the lines of the load, "
+        "converted to displacement, without gain. An arrow on a colour bar means that a measured "
+        "value is larger. On the kernel's map, a pressure, squares only show the places."
+    )
     if first.maps and first.own[first.body.column].strongest:
         figure = surfaces_figure(
             first.kernel.scene, first.maps, gallery.style, measured=first.measured
         )
         has_level = any(surface.level is not None for surface in first.maps.values())
         captions = [
-            rms_text(first.kernel.scene.pressure), _free_vibration(first.bodies), CAPTION,
-            THRESHOLD_CAPTION * has_level, MEASURED_CAPTION * bool(first.measured),
+            rms_text(first.kernel.scene.pressure), _free_vibration(first.bodies), beyond_kernel,
+            threshold_caption * has_level, measured_caption * bool(first.measured),
         ]  # fmt: skip
         parts.append(gallery.figure("propagation", figure, " ".join(filter(None, captions))))
     return [*parts, _uncertainty(first)]
