@@ -120,11 +120,9 @@ def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> tuple[floa
     whole = waveforms(0.0)
     moving = whole - whole.mean(axis=0)
     speed = float(np.linalg.norm(np.diff(moving, axis=0))) * RATE
-    frequency_shift = 1e-3  # of natural frequencies, for the sensitivity
-    change = float(relative_changes(waveforms(frequency_shift) - whole, whole).max())
-    return change / frequency_shift, speed / max(float(np.linalg.norm(moving)), 1e-300) / (
-        2 * np.pi
-    )
+    by = 1e-3  # of natural frequencies
+    change = float(relative_changes(waveforms(by) - whole, whole).max())
+    return change / by, speed / max(float(np.linalg.norm(moving)), 1e-300) / (2 * np.pi)
 
 
 def series_error(
