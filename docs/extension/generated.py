@@ -95,6 +95,7 @@ def _option(parser: argparse.ArgumentParser, action: argparse.Action) -> list[st
 def scene_keys() -> str:
     """Return all keys of scene files with their meanings and defaults."""
     from simple_model import Material, MovingPressure, PronyTerm, Rhythm, Signal, Tacton, Trajectory
+    from simple_model.load.spot_map import SpotMap
     from skinwave import Body, Load, Scene
     from skinwave.bodies import Layer, Mounting, Phalanx, Placement, Relief
     from skinwave.scene import keys as scene_keys
@@ -102,8 +103,8 @@ def scene_keys() -> str:
 
     sections = scene_keys.SECTIONS
     records: dict[str, list[type]] = {
-        "tacton": [Tacton, Trajectory], "focus": [MovingPressure], "body": [Body], "load": [Load],
-        "placement": [Placement], "probes": [Scene],
+        "tacton": [Tacton, Trajectory], "focus": [MovingPressure, SpotMap], "body": [Body],
+        "load": [Load], "placement": [Placement], "probes": [Scene],
     }  # fmt: skip
     inner = {
         "tacton.rhythm": (scene_keys.PULSES, Rhythm),

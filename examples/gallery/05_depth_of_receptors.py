@@ -16,7 +16,7 @@ import numpy as np
 from scipy.integrate import quad
 
 from simple_model import MovingPressure, Tacton, lines
-from simple_model.load.focus import gaussian_width
+from simple_model.load.focus import spot_width
 from skinwave import Body, Scene, simulate
 
 load = MovingPressure(tacton=Tacton(am_frequency=1.0, duration=10.0))  # slow: no inertia
@@ -31,7 +31,7 @@ strain = lines(simulate(scene, "flat-body-harmonic", 0.2, times=times), [1.0])[0
 
 # %%
 # At 1 Hz the line of the squared drive has half of the peak pressure.
-width, mu = gaussian_width(load.height, load.profile), body.solid.shear_modulus
+width, mu = spot_width(load.height), body.solid.shear_modulus
 
 
 def closed_form(z):

@@ -13,7 +13,7 @@ import numpy as np
 
 from simple_model import MovingPressure, Tacton, sensation_level, threshold
 from simple_model.layers.compliance import slab
-from simple_model.load.focus import gaussian_width
+from simple_model.load.focus import spot_width
 from skinwave import Body, Scene, simulate
 
 load = MovingPressure(tacton=Tacton(am_frequency=100, duration=1.0))
@@ -34,7 +34,7 @@ ax.legend()
 # %%
 # The line at 200 Hz is checked by a sum over wavenumbers: the compliance of the slab times the
 # transform of the focal spot.
-layer, width = scene.body.solid, gaussian_width(load.height, load.profile)
+layer, width = scene.body.solid, spot_width(load.height)
 k = np.linspace(1.0, 1500.0, 6000)[None, :]  # rad/m
 G = slab(layer, scene.body.depth)(k + 0j, np.array([[2 * np.pi * 200 + 0j]]))
 spot = width**2 * np.exp(-((k * width) ** 2) / 2)

@@ -37,7 +37,7 @@ from simple_model.layers.wavenumber_integral import (
     normal_field,
     point_integrals,
 )
-from simple_model.load.focus import gaussian_width
+from simple_model.load.focus import GaussianSum, gaussian_sum
 from simple_model.load.path_cells import cells, jump_times, path_fourier, path_samples, sampled_load
 from simple_model.load.pressure import MovingPressure, check_lines
 from simple_model.load.sampling import (
@@ -67,8 +67,8 @@ def steady_lines(
     """Compute steady-state lines of the normal displacement, by wavenumber integrals.
 
     Frequencies (f,) in Hz >= 0 and amplitudes a (f, p) in m of Re a exp(2 pi i f t) at probes
-    (p, 2) in m, for a Gaussian focus. Lines weaker than `threshold` times the strongest line of the
-    load are left out.
+    (p, 2) in m, for a focus that is a sum of Gaussians. Lines weaker than `threshold` times the
+    strongest line of the load are left out.
     """
     f, amplitudes = field_lines(normal_field(compliance), pressure, probes, threshold=threshold)
     return f, amplitudes[..., 0]
@@ -79,16 +79,20 @@ def field_lines(
 ) -> tuple[Floats, Complex]:
     """Frequencies (f,) and amplitudes (f, p, m) of all components, as in `steady_lines`."""
     path, blocks = _path(field, pressure, probes, threshold)
-    g = point_integrals(field, path.distances, 2 * np.pi * path.frequencies, path.width)
+    g = point_integrals(field, path.distances, 2 * np.pi * path.frequencies, path.spot.width)
     return path.frequencies, np.concatenate([path.combine(g, h) for h in blocks], axis=1)
 
 
-def weighted_splines(field: Field, splines: Splines, away: Floats) -> Floats:
+def weighted_splines(field: Field, splines: Splines, spot: GaussianSum, away: Floats) -> Floats:
     """Splines times weights of a field, (m, c, j, ..., q), at offsets (..., q, 2) in m of probes
     from positions of a focus; components are sums over integrals (c, j).
     """
-    of_distance = np.moveaxis(splines(np.linalg.norm(away, axis=-1)), -1, 0)
-    return np.asarray(field.weights(away)[:, :, None] * of_distance)
+    total = np.zeros(())
+    for offset, share in zip(spot.offsets, spot.shares, strict=True):
+        moved = away - offset
+        of_distance = np.moveaxis(splines(np.linalg.norm(moved, axis=-1)), -1, 0)
+        total = total + field.weights(moved)[:, :, None] * (share * of_distance)
+    return total
 
 
 def steady_history(
@@ -104,11 +108,11 @@ def steady_history(
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Path:
     """Lines of a load at distinct `frequencies` (f,) in Hz: indices of frequency `lines` (l,) and
-    harmonic `orders` (l,), `coefficients` (l,) in Pa; standard deviation `width` of the focal spot
-    and `distances` (j,) of the integrals, m.
+    harmonic `orders` (l,), `coefficients` (l,) in Pa; the focal `spot`, and `distances` (j,) in m
+    of the integrals.
     """
 
-    width: float
+    spot: GaussianSum
     distances: Floats
     frequencies: Floats
     lines: Ints
@@ -132,19 +136,21 @@ def _path(
     """Lines of a load, and blocks of probes of the harmonics (n, m, c, j, p) of a field, h_nmcj =
     int_0^1 W_mc B_j(|x_p - X(a)|) exp(-2 pi i n a) da with its weights W.
     """
-    width = _width(pressure)
+    spot = _gaussians(pressure)
     load, places = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
     frequencies, lines = np.unique(np.round(load.frequencies, 9), return_inverse=True)
     distinct, orders = np.unique(load.harmonics, return_inverse=True)
     knots = path_samples(pressure)
-    table, splines = _interpolation(places, knots, width)
+    table, splines = _interpolation(places, knots, spot)
     path = _Path(
-        width=width, distances=table, frequencies=frequencies, lines=lines, orders=orders,
+        spot=spot, distances=table, frequencies=frequencies, lines=lines, orders=orders,
         coefficients=load.coefficients,
     )  # fmt: skip
     count = min(len(places), max(1, len(places) * len(table) * len(knots) // AT_ONCE))
     blocks = (
-        np.moveaxis(path_fourier(pressure, weighted_splines(field, splines, away), distinct), -1, 0)
+        np.moveaxis(
+            path_fourier(pressure, weighted_splines(field, splines, spot, away), distinct), -1, 0
+        )
         for away in (some[:, None] - knots for some in np.array_split(places, count))
     )
     return path, blocks
@@ -159,7 +165,7 @@ def path_operator(
 
     def lines_of(compliance: Compliance) -> tuple[Floats, Complex]:
         field, omega = normal_field(compliance), 2 * np.pi * path.frequencies
-        g = point_integrals(field, path.distances, omega, path.width)
+        g = point_integrals(field, path.distances, omega, path.spot.width)
         return path.frequencies, path.combine(g, harmonics)[..., 0]
 
     return lines_of
@@ -194,7 +200,7 @@ def flat_body(
     Parameters
     ----------
     compliance : Compliance
-    pressure : MovingPressure, with a Gaussian focus
+    pressure : MovingPressure, with a Gaussian focus or a `SpotMap`
     probes : (p, 2) float, m
     times : (t,) float, s, equally spaced
 
@@ -205,7 +211,7 @@ def flat_body(
     Raises
     ------
     ValueError
-        If the focus is not Gaussian, or the load is a subclass of MovingPressure.
+        If the focus is no sum of Gaussians, or the load is a subclass of MovingPressure.
 
     >>> from simple_model import Tacton
     >>> from simple_model.layers.compliance import slab
@@ -226,7 +232,7 @@ def field_history(
     field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
     """All components (t, p, m) of a field from rest, as in `flat_body`."""
-    width = _width(pressure)
+    spot = _gaussians(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
     within, padded = transform_samples(times)
     dt, n = step(times) / within, (len(times) - 1) * within + 1
@@ -257,11 +263,11 @@ def field_history(
         turns = len(pressure.tacton.trajectory.parts[1]) > 1
         parts = max(parts, abrupt_parts if len(jumps) or turns else 1)
         knots, of_load = _sampled_load(pressure, jumps, padded, dt, parts, lasting)
-    table, splines = _interpolation(probes, knots, width)
-    g = _transient(field, tuple(table.tolist()), padded, dt, width)
+    table, splines = _interpolation(probes, knots, spot)
+    g = _transient(field, tuple(table.tolist()), padded, dt, spot.width)
     u = np.zeros((len(w), len(probes), len(field.weights(SAMPLE_OFFSETS))), np.complex128)
     for i, probe in enumerate(probes):
-        weighted = weighted_splines(field, splines, probe - knots)
+        weighted = weighted_splines(field, splines, spot, probe - knots)
         for m, c in np.argwhere(field.weights(SAMPLE_OFFSETS).any(axis=-1)):
             blocks = min(len(table), len(table) * padded * parts // AT_ONCE + 1)
             for some in np.array_split(np.arange(len(table)), blocks):
@@ -344,15 +350,16 @@ def _make_response(
     return Response(model=model, times=times, probes=probes, values=values, effort=effort)
 
 
-def _width(pressure: MovingPressure) -> float:
-    """Standard deviation in m of a Gaussian focal spot; raises a ValueError for any other load."""
+def _gaussians(pressure: MovingPressure) -> GaussianSum:
+    """The focal spot as a sum of Gaussians; raises a ValueError for any other load."""
     check_lines(pressure)
-    width = gaussian_width(pressure.height, pressure.profile)
-    if width is None:
+    spot = gaussian_sum(pressure.height, pressure.profile)
+    if spot is None:
         raise ValueError(
-            f"flat-body models do not support the focus '{pressure.profile_name}'; use 'gaussian'"
+            f"flat-body models do not support the focus '{pressure.profile_name}'; use 'gaussian', "
+            "or a map"
         )
-    return width
+    return spot
 
 
 def spline_steps(furthest: float) -> int:
@@ -361,19 +368,25 @@ def spline_steps(furthest: float) -> int:
     return shared_steps * max(1, int(np.ceil(furthest * STEPS_PER_WIDTH / shared_steps))) + 1
 
 
-def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
+def _interpolation(probes: Floats, knots: Floats, spot: GaussianSum) -> tuple[Floats, Splines]:
     """Distances (j,) in m of the integrals, and the function from distances (...) to the shares
     (..., j) that interpolate between them: cubic splines, flat at 0; few distances are used
     directly.
     """
     few_distances = 40  # largest number that is computed without splines
-    if len(knots) * len(probes) <= few_distances:
-        unique = np.unique(np.linalg.norm(probes[:, None] - knots, axis=-1))
+    if len(knots) * len(probes) * len(spot.shares) <= few_distances:
+        away = (probes[:, None] - knots)[:, :, None] - spot.offsets
+        unique: Floats = np.unique(np.linalg.norm(away, axis=-1))
         return unique, lambda r: (r[..., None] == unique).astype(float)
     from scipy.interpolate import CubicSpline  # slow to import
 
-    furthest = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
-    steps = spline_steps(furthest / width)
-    table: Floats = width / STEPS_PER_WIDTH * np.arange(steps, dtype=np.float64)
+    steps = spline_steps(furthest(probes, knots, spot) / spot.width)
+    table: Floats = spot.width / STEPS_PER_WIDTH * np.arange(steps, dtype=np.float64)
     flat = (1, np.zeros(steps))
     return table, CubicSpline(table, np.eye(steps), bc_type=(flat, "not-a-knot"))
+
+
+def furthest(probes: Floats, knots: Floats, spot: GaussianSum) -> float:
+    """Largest distance in m of probes (p, 2) from Gaussians of a spot at positions (q, 2)."""
+    away = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
+    return float(away + np.linalg.norm(spot.offsets, axis=1).max())

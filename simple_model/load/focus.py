@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from scipy.special import j1
 
 from simple_model.choices import check_range
+from simple_model.load.spot_map import GaussianSum
 from simple_model.typing import Complex, Floats
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ HALF_DEPTH = 37e-3  # m at 200 mm, above and below the focus, to half its intens
 NOMINAL_HEIGHT = 0.200  # m
 FOCI = ("gaussian", "main_lobe", "array")
 CONTACT_WIDTHS = (0.2e-3, 20e-3)  # m, standard deviations of a `ContactSpot`
+REACH = 5.7  # standard deviations at which a Gaussian is 1e-7
 FocalSpot = Callable[[Floats], Floats]  # offsets (..., 2) in m from the focus -> relative (...)
 
 # Force of `array_field` on a disc of radius 10 mm about the focus, relative to 200 mm. A balance
@@ -43,6 +45,10 @@ _FORCES = np.array(
     [0.2395, 0.4048, 0.5717, 0.6989, 0.7850, 0.8502, 0.9319, 0.9860]
     + [1.0, 0.9963, 0.9634, 0.8655, 0.7505, 0.6411, 0.4644, 0.3414]
 )
+
+
+def _one_gaussian(width: float) -> GaussianSum:
+    return GaussianSum(width=width, offsets=np.zeros((1, 2)), shares=np.ones(1))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +69,16 @@ class ContactSpot:
     def spacing(self) -> float:
         """Length in m that samples must resolve."""
         return self.width
+
+    @property
+    def reach(self) -> float:
+        """Radius in m beyond which it is below 1e-7."""
+        return REACH * self.width
+
+    @property
+    def gaussians(self) -> GaussianSum:
+        """The same as a sum."""
+        return _one_gaussian(self.width)
 
     def __call__(self, offsets: Floats) -> Floats:
         """Relative traction (...) at offsets (..., 2) in m from the middle."""
@@ -173,27 +189,26 @@ def spot_detail(height: float, profile: str | FocalSpot) -> float:
     return min(spot_width(height), getattr(profile, "spacing", np.inf))
 
 
-def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
+def along_axis(offset: ArrayLike, width: float = GAUSSIAN_WIDTH) -> Floats:
     """Relative intensity (...) on the axis, at an offset (...) in m above or below the focus.
 
-    A Gaussian whose half width is proportional to the square of that of the focal spot, within 4 %
-    of `array_field`.
+    A Gaussian whose half width is proportional to the square of that of the focal spot, here as
+    the standard deviation `width` in m. It is within 4 % of `array_field`.
     """
-    half_width = HALF_DEPTH * (lobe_width(height) / lobe_width(NOMINAL_HEIGHT)) ** 2
+    half_width = HALF_DEPTH * (width / GAUSSIAN_WIDTH) ** 2
     return np.exp(-np.log(2) * (np.asarray(offset, np.float64) / half_width) ** 2)
 
 
 def spot_reach(height: float, profile: str | FocalSpot) -> float:
-    """Radius in m beyond which a Gaussian focal spot is below 1e-7; infinite for others."""
-    width = gaussian_width(height, profile)
-    return np.inf if width is None else 5.7 * width
+    """Radius in m beyond which a focal spot is below 1e-7; infinite if that is not known."""
+    own = REACH * spot_width(height) if profile == "gaussian" else np.inf
+    return float(getattr(profile, "reach", own))
 
 
-def gaussian_width(height: float, profile: str | FocalSpot) -> float | None:
-    """Standard deviation in m of a focal spot; None if it is not Gaussian."""
-    if isinstance(profile, ContactSpot):
-        return profile.width
-    return spot_width(height) if profile == "gaussian" else None
+def gaussian_sum(height: float, profile: str | FocalSpot) -> GaussianSum | None:
+    """Return a focal spot as a sum of Gaussians; None if that is not known."""
+    own = _one_gaussian(spot_width(height)) if profile == "gaussian" else None
+    return getattr(profile, "gaussians", own)
 
 
 @cache

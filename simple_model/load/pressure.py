@@ -23,7 +23,9 @@ from simple_model.load.focus import (
     along_axis,
     relative_intensity,
     spot_of_foci,
+    spot_width,
 )
+from simple_model.load.spot_map import SpotMap
 from simple_model.load.tacton import Tacton, level, modulation
 from simple_model.typing import Floats
 
@@ -42,8 +44,8 @@ class MovingPressure:
     Parameters
     ----------
     tacton : Tacton
-    profile : "gaussian", "main_lobe" or "array", the shape of the focal spot; or a function of
-        offsets (..., 2) in m, with details no finer than those of the Gaussian
+    profile : "gaussian", "main_lobe" or "array", the shape of the focal spot; a `SpotMap`; or a
+        function of offsets (..., 2) in m, with details no finer than those of the Gaussian
     drive : "linear", "pressure_squared", "force_corrected", or a DriveLaw
     depth_of_modulation : float, 0 to 1; the linear law does not use it
     peak_pressure : float, Pa, at the focus at full drive and 200 mm. The default of 50 Pa,
@@ -106,8 +108,15 @@ class MovingPressure:
 
     @property
     def profile_name(self) -> str:
-        """Name of the focal spot; "own" for a function."""
-        return self.profile if isinstance(self.profile, str) else "own"
+        """Name of the focal spot; "file" for a map, "own" for a function."""
+        if isinstance(self.profile, str):
+            return self.profile
+        return "file" if isinstance(self.profile, SpotMap) else "own"
+
+    @property
+    def spot_scale(self) -> float:
+        """Standard deviation in m of a Gaussian as wide as the focal spot."""
+        return float(getattr(self.profile, "width", spot_width(self.height)))
 
     def __call__(self, points: ArrayLike, t: ArrayLike) -> Floats:
         """Pressure (..., n) in Pa at points (n, 2 or 3) in m and times (...) in s."""
@@ -161,7 +170,7 @@ class MovingPressure:
         spot = spot_of_foci(points[:, :2], centre, self.height, self.profile)
         contact = isinstance(self.profile, ContactSpot)
         if points.shape[1] == 3 and points[:, 2].any() and not contact:
-            spot *= along_axis(points[:, 2], self.height)
+            spot *= along_axis(points[:, 2], self.spot_scale)
         return spot
 
 

@@ -143,18 +143,20 @@ def check_seed(seed: int) -> None:
 
 def note_scenes(options: argparse.Namespace) -> None:
     """Warn of implausible numbers in the scenes of a command, unless the warnings of its responses
-    do, and print a note if it ignores their spreads.
+    do, and print notes on the map of a focus, and on spreads that it ignores.
 
     The command itself refuses a file that cannot be read.
     """
     name = options.command_name
     has_own_warnings = name in ("plan", "run")
     samples = (name == "run" and options.samples is not None) or getattr(options, "best", None)
-    has_no_note = samples or name == "plan" or getattr(options, "quiet", False)
-    if has_own_warnings and has_no_note:
+    is_quiet = getattr(options, "quiet", False)
+    has_no_note = samples or name == "plan" or is_quiet
+    if has_own_warnings and is_quiet:
         return
     from skinwave.planning.plan_warnings import implausible
     from skinwave.scene.file import read
+    from skinwave.scene.focus_file import focus_note
 
     for path in [getattr(options, "scene", None), *getattr(options, "scenes", [])]:
         with warnings.catch_warnings(), suppress(ValueError):
@@ -163,6 +165,8 @@ def note_scenes(options: argparse.Namespace) -> None:
                 continue
             scene = read(path)
             warn(() if has_own_warnings else implausible(scene))
+            if not is_quiet and (note := focus_note(scene.pressure)):
+                say(f"skinwave: {note}", sys.stderr)
             if scene.spreads and not has_no_note:
                 keys = ", ".join(key for key, _ in scene.spreads)
                 say(f"skinwave: uses the central values of {keys}; skinwave run --samples N "

@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
             scene = with_body(scene, body)
         scenes, title = own_scenes(scene, folder_name(scene.name)), scene.name
         out = f"{Path(options.scene).stem}-compared"
-        inputs += [options.scene, given.body.file, options.measured or ""]
+        inputs += [options.scene, *given.files, options.measured or ""]
     with result_folder(options, out, inputs, given) as (folder, progress):
         live = list(scenes[first_name(scenes)].values())
         if given is None:  # a palm takes minutes on the live page, a flat slab a second

@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     scene = read(options.scene)
     check_load(scene, "dispersion")
     found = driven_modes(scene, highest=options.highest, most=options.modes)
-    name, inputs = f"{options.scene.stem}-dispersion", [options.scene, scene.body.file]
+    name, inputs = f"{options.scene.stem}-dispersion", [options.scene, *scene.files]
     with result_folder(options, name, inputs, scene) as (folder, _):
         write(folder, found)
     closing(options, sentences(found))

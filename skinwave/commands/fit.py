@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
     check_seed(options.seed)
     scene = read(options.scene)
     measured = _read_measurement(options.measured, options)
-    name, inputs = f"{options.scene.stem}-fit", [options.scene, options.measured, scene.body.file]
+    name, inputs = f"{options.scene.stem}-fit", [options.scene, options.measured, *scene.files]
     with result_folder(options, name, inputs, scene) as (folder, progress):
         found = fit(
             scene, measured, options.vary, tie=options.tie, kind=options.to or "",

@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.results.outputs import output_file
 
     scenes = [read_scene(path) for path in options.scenes]
-    inputs = [*options.scenes, *(scene.body.file for scene in scenes if scene.body.file)]
+    inputs = [*options.scenes, *(file for scene in scenes for file in scene.files)]
     with (
         output_file(options.out, overwrite=options.overwrite, inputs=inputs) as file,
         progress_of(options) as progress,

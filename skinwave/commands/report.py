@@ -102,7 +102,7 @@ def _page(options: argparse.Namespace) -> int:
         options.out, options.overwrite = source / "report", True
         if options.out.is_symlink():
             raise ValueError(f"{options.out} is a link; remove it, or name a folder with --out")
-    inputs = [source, scene.body.file if scene else ""]
+    inputs = [source, *(scene.files if scene else ())]
     failures: dict[str, str] = {}
     with result_folder(options, f"{source.stem}-report", inputs, scene) as (folder, progress):
         if scene is not None:
@@ -130,7 +130,7 @@ def _map(options: argparse.Namespace) -> int:
     scene = replace(scene, depth=depth)
     reach = REACH if options.reach is None else options.reach
     step = STEP if options.step is None else options.step
-    name, inputs = f"{options.source.stem}-map", [options.source, scene.body.file]
+    name, inputs = f"{options.source.stem}-map", [options.source, *scene.files]
     with result_folder(options, name, inputs, scene) as (folder, progress):
         given = solving(options, progress)
         found = quantity_map(scene, given, reach=reach / 1e3, step=step / 1e3)

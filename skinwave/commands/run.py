@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     scene = read(options.scene)
     if options.samples is not None:
         check(spreads_of(scene), options.samples, options.seed)
-    inputs = [options.scene, scene.body.file]
+    inputs = [options.scene, *scene.files]
     with (
         result_folder(options, f"{options.scene.stem}-out", inputs) as (folder, progress),
         pool(1) as workers,

@@ -78,7 +78,7 @@ def _tradeoff(options: argparse.Namespace) -> int:
     from skinwave.studies.tradeoff import sentences, study, write
 
     scene, name = read(options.scene), f"{options.scene.stem}-tradeoff"
-    inputs = [options.scene, scene.body.file]
+    inputs = [options.scene, *scene.files]
     with result_folder(options, name, inputs, scene) as (folder, progress):
         found = study(scene, progress)
         write(folder, scene, found)

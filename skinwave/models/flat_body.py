@@ -16,13 +16,14 @@ from simple_model.layers.flat_body import (
     TRANSFORM_RATE,
     WRAP_AROUND,
     field_history,
+    furthest,
     spline_steps,
     steady_history,
     transform_samples,
 )
 from simple_model.layers.flat_quantities import quantity_field, surface_field, traction_field
 from simple_model.layers.wavenumber_integral import FEWEST_NODES, MOST_NODES, Field
-from simple_model.load.focus import gaussian_width, spot_width
+from simple_model.load.focus import gaussian_sum
 from simple_model.load.path_cells import is_abrupt, path_samples
 from simple_model.load.sampling import highest_line, is_folded, oversampling
 from simple_model.quantities import DISPLACEMENT
@@ -152,9 +153,9 @@ def _limits(scene: Scene) -> Iterator[Limit]:
         )  # fmt: skip
     if body.of_kind.is_plate:
         yield from isotropic_limits(body)
-    if gaussian_width(pressure.height, pressure.profile) is None:
+    if gaussian_sum(pressure.height, pressure.profile) is None:
         yield Limit(
-            why=f"needs a Gaussian focus, not the profile {pressure.profile_name}",
+            why=f"needs a Gaussian focus or a map of one, not the profile {pressure.profile_name}",
             cure='set profile = "gaussian"',
             change=lambda scene: replace(
                 scene, pressure=replace(scene.pressure, profile="gaussian")
@@ -187,11 +188,13 @@ def _with_loss(scene: Scene) -> Scene:
     return of_part("solid", viscosity=viscosity)(scene)
 
 
-def _distances(scene: Scene) -> int:
-    """Return the number of distances at which a field is integrated."""
-    knots, width = path_samples(scene.pressure), spot_width(scene.pressure.height)
-    furthest = max(np.linalg.norm(knots - probe, axis=1).max() for probe in scene.probe_points)
-    return spline_steps(float(furthest) / width)
+def _distances(scene: Scene) -> tuple[int, int]:
+    """Return the numbers of distances at which a field is integrated, and of Gaussians."""
+    pressure = scene.pressure
+    spot = gaussian_sum(pressure.height, pressure.profile)
+    assert spot is not None  # the limits
+    far = furthest(scene.probe_points, path_samples(pressure), spot)
+    return spline_steps(far / spot.width), len(spot.shares)
 
 
 def _integrals(scene: Scene) -> tuple[int, int, float, float]:
@@ -211,7 +214,8 @@ def _integrals(scene: Scene) -> tuple[int, int, float, float]:
 
 
 def _cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
-    times, count, distances = computed_times(scene, options), len(scene.probes), _distances(scene)
+    times, count = computed_times(scene, options), len(scene.probes)
+    distances, gaussians = _distances(scene)
     fields, terms, evaluation, loss = _integrals(scene)
     _, padded = transform_samples(times)
     damped = loss - 2 * log(WRAP_AROUND) / (padded / TRANSFORM_RATE) / (2 * pi * LOSS_AT)
@@ -224,7 +228,9 @@ def _cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
     at_once = min(distances * padded * parts, AT_ONCE)
     return Cost(
         parts={
-            f"{PROBES}, or a smaller path": START + TRANSFORM * transformed,
+            f"{PROBES}, or a smaller path": START
+            + TRANSFORM * transformed
+            + PATTERN * count * distances * (gaussians - 1) * knot_count(scene),
             LINES: made,
             "use a material with more loss": evaluation * evaluations,
         },
@@ -233,7 +239,7 @@ def _cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
 
 
 def _steady_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
-    times, distances = computed_times(scene, options), _distances(scene)
+    times, (distances, gaussians) = computed_times(scene, options), _distances(scene)
     fields, _, evaluation, loss = _integrals(scene)
     nodes = min(max(RESONANT_NODES / loss, FEWEST_NODES), MOST_NODES)
     lines = lines_below(scene, times)
@@ -242,7 +248,10 @@ def _steady_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
     return Cost(
         parts={
             DURATION: START + seconds,
-            LINES: PATTERN * len(scene.probes) * distances * (knot_count(scene) + lines),
+            LINES: PATTERN
+            * len(scene.probes)
+            * distances
+            * (gaussians * knot_count(scene) + lines),
             "use a material with more loss": evaluation * evaluations
             + BESSEL * fields * nodes * distances,
         },

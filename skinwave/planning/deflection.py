@@ -9,7 +9,6 @@ from functools import lru_cache
 import numpy as np
 
 from simple_model import Response
-from simple_model.load.focus import spot_width
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies.supports import FRAME
 from skinwave.models import Model, plate_modes
@@ -23,7 +22,7 @@ from skinwave.models.plate_modes import (
     middle_compliance,
     relative_modulus,
 )
-from skinwave.planning.estimates import mean_gain, spot_scale
+from skinwave.planning.estimates import mean_gain
 from skinwave.scene.scene import Scene
 
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet may be taken as linear
@@ -145,9 +144,7 @@ def mean_sag(scene: Scene) -> float:
 
 def _mean_force(scene: Scene) -> float:
     """Return the mean force in N on the middle of a flat body."""
-    if scene.load.moving.is_plain:
-        return float(2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene))
     downwards = -scene.load.tractions(np.array([[0.0, 0.0, 1.0]]))[:, 0, 2]
-    forces = [2 * np.pi * spot_scale(each) ** 2 * mean_gain(replace(scene, pressure=each))
+    forces = [2 * np.pi * each.spot_scale ** 2 * mean_gain(replace(scene, pressure=each))
               for each in scene.loads]  # fmt: skip
     return float(downwards @ forces)

@@ -15,7 +15,6 @@ from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.plate_modes import STRETCHED, thick_mesh_part
 from skinwave.models.reduced import ReducedBody
 from skinwave.planning.deflection import stretching_error
-from skinwave.planning.estimates import spot_scale
 from skinwave.planning.left_out import series_error
 from skinwave.planning.plan_warnings import rigid_body_drift, under_resolved
 from skinwave.planning.refinement import enough
@@ -86,7 +85,7 @@ def reduction_part(error: float) -> ErrorPart:
 
 def element_warnings(scene: Scene, h: float) -> tuple[str, ...]:
     """Return the warnings of elements of h in m apart from their error."""
-    return (*rigid_body_drift(scene), *under_resolved(h, spot_scale(scene.pressure)))
+    return (*rigid_body_drift(scene), *under_resolved(h, scene.pressure.spot_scale))
 
 
 def band_part(scene: Scene, band: float, error: float) -> ErrorPart:

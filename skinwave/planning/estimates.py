@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from simple_model import MovingPressure, Trajectory
+from simple_model import Trajectory
 from simple_model.layers.flat_body import field_history, steady_lines
 from simple_model.layers.flat_quantities import surface_field
 from simple_model.layers.wavenumber_integral import point_response
-from simple_model.load.focus import gaussian_width, spot_width
+from simple_model.load.focus import gaussian_sum
 from simple_model.load.spectrum import load_lines, merge_lines
 from simple_model.load.trajectory import BY_POINTS
 from simple_model.quantities import DISPLACEMENT
@@ -34,7 +34,9 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
         f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
-        if _width(pressure) is None:  # a Gaussian of the same width shows which lines matter
+        if (
+            gaussian_sum(pressure.height, pressure.profile) is None
+        ):  # a Gaussian of the same width shows which lines matter
             pressure = replace(pressure, profile="gaussian")
         try:
             f, a = steady_lines(
@@ -60,16 +62,8 @@ def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> f
 
 def has_wavenumber_solution(scene: Scene) -> bool:
     """Whether a wavenumber integral solves the scene, apart from reflections from the sides."""
-    return is_flat_layer(scene.body) and _width(scene.pressure) is not None
-
-
-def spot_scale(pressure: MovingPressure) -> float:
-    """Return the standard deviation in m of a Gaussian as wide as the focal spot."""
-    return _width(pressure) or spot_width(pressure.height)
-
-
-def _width(pressure: MovingPressure) -> float | None:
-    return gaussian_width(pressure.height, pressure.profile)
+    spot = gaussian_sum(scene.pressure.height, scene.pressure.profile)
+    return is_flat_layer(scene.body) and spot is not None
 
 
 def side_reflections(scene: Scene) -> float:
@@ -87,7 +81,7 @@ def side_reflections(scene: Scene) -> float:
     if not images:
         return 0.0
     is_estimated = scene.load.is_normal
-    if not is_estimated or _to_edge(scene, half) < 2 * spot_scale(scene.pressure):
+    if not is_estimated or _to_edge(scene, half) < 2 * scene.pressure.spot_scale:
         return NO_BOUND
     estimated_duration = 0.1  # s of the estimate of reflections
     duration = min(scene.tacton.duration, estimated_duration)
@@ -129,7 +123,7 @@ def absorbing_reflection(scene: Scene, half: Floats, highest: float) -> float:
     in the four sides, for lines of the load up to `highest` in Hz.
     """
     body = scene.body
-    width = spot_scale(scene.pressure)
+    width = scene.pressure.spot_scale
     path = path_places(scene.tacton.trajectory)
     if _to_edge(scene, half) < 2 * width:
         return 1.0

@@ -21,7 +21,7 @@ from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import answer, prepare, reduction_tolerance
 from skinwave.models.relative_change import relative_changes
 from skinwave.models.symmetry import mirrored_axes
-from skinwave.planning.estimates import FAR, absorbing_reflection, spot_scale
+from skinwave.planning.estimates import FAR, absorbing_reflection
 from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import about_its_rest, element_sizes
 from skinwave.scene.scene import Body, Scene
@@ -45,7 +45,7 @@ def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -
     """Return the error of the absorbing base and sides of a meshed body, 0 without any."""
     if not has_layer(body):
         return 0.0
-    size = min(float(element_sizes(body)[0]), 2 * spot_scale(scene.pressure))
+    size = min(float(element_sizes(body)[0]), 2 * scene.pressure.spot_scale)
     axes = symmetry(scene)
 
     def waveforms(wider: float, reduction: float) -> Floats:

@@ -11,6 +11,7 @@ from skinwave.bodies.supports import FRAME
 from skinwave.models import named
 from skinwave.report.figures import run_label
 from skinwave.results.run import Run
+from skinwave.scene.focus_file import focus_note
 from skinwave.scene.scene import Body, Scene
 
 
@@ -20,7 +21,7 @@ def _spot(pressure: MovingPressure) -> str:
         "main_lobe": "focus S = sinc²(D/D₀)",
         "array": "whole field of the array",
     }
-    return spots.get(pressure.profile_name, "custom focal spot")
+    return focus_note(pressure) or spots.get(pressure.profile_name, "custom focal spot")
 
 
 def model_paragraphs(runs: Sequence[Run]) -> list[str]:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simple_model import drawing
-from simple_model.load.focus import spot_width
 from simple_model.numbers import interval, percent, plural
 from skinwave.report.description import scene_rows
 from skinwave.typing import Floats
@@ -190,7 +189,7 @@ def _draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
 
 def _draw_foci(ax: "Axes", scene: "Scene") -> None:
     """Draw the contour of half the pressure around every focus at the start."""
-    tacton, width = scene.tacton, spot_width(scene.pressure.height)
+    tacton, width = scene.tacton, scene.pressure.spot_scale
     phases = np.mod(tacton.trajectory.phase(0.0) + np.array(tacton.foci), 1.0)
     spot_reach = 4.0  # widths of a focal spot within which its contour is drawn
     across = spot_reach * width * np.linspace(-1, 1, 81)

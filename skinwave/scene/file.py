@@ -13,6 +13,7 @@ import tomli_w
 from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
+from simple_model.load.spot_map import SpotMap
 from simple_model.load.trajectory import BY_POINTS
 from skinwave.bodies.body import BodyKind, check_keys
 from skinwave.bodies.parts import check_material
@@ -22,6 +23,7 @@ from skinwave.scene.distributions import (
     distribution_table,
     read_distribution,
 )
+from skinwave.scene.focus_file import with_spot
 from skinwave.scene.keys import (
     DERIVED,
     PATH,
@@ -59,11 +61,7 @@ def read(path: str | Path) -> Scene:
     """
     text = reading.read_text(path, must=SCENE)
     try:
-        scene = from_table({"name": Path(path).stem} | parse_toml(text, Path(path).parent))
-        if scene.body.file:  # relative to the scene file
-            place = str((Path(path).parent / scene.body.file).resolve())
-            scene = replace(scene, body=replace(scene.body, file=place))
-        return scene
+        return from_table({"name": Path(path).stem} | parse_toml(text, Path(path).parent))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
@@ -80,7 +78,9 @@ def loads(text: str) -> Scene:
 
 
 def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
-    """Return the table of a TOML text; numbers replace the modulus files in a folder."""
+    """Return the table of a TOML text, with files in a folder: numbers replace the modulus files,
+    and the files of body and focus get their full path.
+    """
     # The time of the parser is quadratic in the parts of a key.
     if max(map(_parts, re.split(r"[\n#={,]", text))) > DEEPEST:
         raise ValueError(TOO_DEEP)
@@ -91,7 +91,12 @@ def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
     except RecursionError:
         raise ValueError(TOO_DEEP) from None
     _check_texts({key: value for key, value in table.items() if key != "name"})
-    return with_tables(table, folder) if folder else table
+    if not folder:
+        return table
+    for section in map(table.get, ("body", "focus")):
+        if isinstance(section, dict) and isinstance(name := section.get("file"), str) and name:
+            section["file"] = str((folder / name).resolve())
+    return with_tables(table, folder)
 
 
 def _parts(text: str) -> int:
@@ -143,7 +148,7 @@ def from_table(table: dict[str, Any]) -> Scene:
         raise ValueError(f"[focus] does not apply to a load of kind '{load.kind}'; remove it")
     tacton, path = _split(parts["tacton"], PATH)
     pressure = MovingPressure(
-        tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **parts["focus"]
+        tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **with_spot(parts["focus"])
     )
     scene = Scene(
         name=top.get("name", "scene"), pressure=pressure, body=body, load=load, **parts["probes"]
@@ -202,7 +207,7 @@ def to_table(scene: Scene) -> dict[str, Any]:
     tacton, body = scene.tacton, scene.body
     sources: dict[str, tuple[Any, ...]] = {
         "tacton": (tacton, tacton.trajectory),
-        "focus": (scene.pressure,),
+        "focus": (scene.pressure, scene.pressure.profile),
         "body": (body,),
         "load": (scene.load,),
         "placement": (body.placement,),
@@ -239,6 +244,8 @@ def _unused_keys(scene: Scene) -> set[str]:
     has |= {"support_motion"} if scene.load.support_motion else set()
     left = {f"load.{key}" for key, field in own if field.name not in has}
     left |= set() if load.is_of_device else {"focus"}
+    has_map = isinstance(scene.pressure.profile, SpotMap)
+    left |= {"focus.height_mm"} if has_map else {"focus.file", "focus.unit"}
     return left | (set() if scene.body.base_stiffness else {"body.base_stiffness_n_per_m3"})
 
 

@@ -14,6 +14,7 @@ from simple_model.choices import choose
 from simple_model.layers.material import PRESETS
 from simple_model.layers.modulus_laws import COLUMNS
 from simple_model.load.focus import FOCI, FocalSpot
+from simple_model.load.spot_map import SpotMap
 from simple_model.load.trajectory import Points
 from skinwave.scene.key_hints import key_hint
 from skinwave.scene.load import SupportMotion
@@ -196,10 +197,12 @@ def _write_drive(drive: str | DriveLaw) -> str:
 
 
 def _write_profile(profile: str | FocalSpot) -> str:
+    if isinstance(profile, SpotMap) and profile.file:
+        return "file"
     if not isinstance(profile, str):
         raise ValueError(
-            "the focus profile is a map or a Python function, which a scene file cannot store; "
-            f"use one of {', '.join(FOCI)}, or simulate it from Python"
+            "the focus profile is a Python function or a map without a file, which a scene file "
+            f"cannot store; use one of {', '.join(FOCI)} or a file, or simulate it from Python"
         )
     return profile
 
@@ -362,6 +365,7 @@ SECTIONS = {
             depth_of_modulation="depth_of_modulation", peak_pressure_pa="peak_pressure",
         ),
         "profile": SceneKey("profile", as_text, _write_profile),
+        **_words_of("file", "unit"),
     },
     "body": {
         **_words_of("kind"), **MADE_OF,

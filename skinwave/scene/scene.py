@@ -194,6 +194,11 @@ class Scene:
         return self.load.pressures(self.pressure)
 
     @property
+    def files(self) -> tuple[str, ...]:
+        """Files of its body and its focus."""
+        return tuple(filter(None, (self.body.file, getattr(self.pressure.profile, "file", ""))))
+
+    @property
     def during_pulses(self) -> Scene:
         """The scene while a pulse of its rhythm is on; see `line_names.during_pulses`."""
         steady = during_pulses(self.pressure)

@@ -78,10 +78,10 @@ class DesignPoint:
         return keys
 
     def name(self, *model_options: object) -> str:
-        """Return a hash of the complete scene, the file of its body and the solver options."""
+        """Return a hash of the complete scene, its files and the solver options."""
         digest = hashlib.sha256(repr((self.text, *model_options)).encode())
-        if self.scene and self.scene.body.file:
-            with reading.open_regular(self.scene.body.file) as file:
+        for name in self.scene.files if self.scene else ():
+            with reading.open_regular(name) as file:
                 digest.update(hashlib.file_digest(file, "sha256").digest())  # type: ignore[arg-type]
         return digest.hexdigest()[:24]
 
@@ -182,11 +182,8 @@ def saltelli_shares(d: int, n: int, seed: int = 0) -> Floats:
 
 def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
     """Return the runs of a scene file for each combination of values, or their errors."""
-    base = read(path)
     table = parse_toml(reading.read_text(path), path.parent)
-    if base.body.file:
-        table["body"]["file"] = base.body.file
-    return cases_of(table, tomllib.loads(dumps(base)), combined)
+    return cases_of(table, tomllib.loads(dumps(read(path))), combined)
 
 
 def cases_of(table: Any, complete: Any, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from simple_model import MovingPressure
 from simple_model.layers.dispersion import DispersionCurves, Mode
-from simple_model.load.focus import lobe_width, spot_width
+from simple_model.load.focus import lobe_width
 from simple_model.load.line_names import line_names
 from simple_model.numbers import significant
 from skinwave.bodies import FLAT
@@ -149,7 +149,7 @@ def _amplitudes(modes: Sequence[Mode], pressure: MovingPressure) -> np.ndarray:
 
     It is 0 for a mode that decays so fast that the spot itself causes more motion there.
     """
-    width, edge = spot_width(pressure.height), lobe_width(pressure.height)
+    width, edge = pressure.spot_scale, lobe_width(pressure.height)
     radiated = [np.abs(mode.wavenumbers.imag) * width**2 < edge for mode in modes]
     return np.where(radiated, [mode.amplitude(width, edge) for mode in modes], 0.0)
 

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from simple_model import Effort, MovingPressure, Response, lines, resolved_lines, sensation_level
 from simple_model.line_table import lines_in_pulses
 from simple_model.load.drive import usual_drive
+from simple_model.load.spot_map import SpotMap
 from simple_model.numbers import decibel, share_of, significant
 from simple_model.point_kernel import published_load
 from skinwave.models import named
@@ -156,6 +157,11 @@ def hierarchy_of(
     not read the displacement of the surface, or no such device exists.
     """
     check_motion(scene, "relax")
+    if isinstance(scene.pressure.profile, SpotMap):
+        raise ValueError(
+            "relax compares focal spots of the array, not a map; remove file, unit and profile of "
+            "[focus], or use skinwave compare"
+        )
     announce(progress, "choose models")
     names = droppable(scene)
     check_rate(update_rate)

@@ -234,9 +234,7 @@ def ensemble(
 
 
 def _is_proportional_to_pressure(scene: Scene, method: Method) -> bool:
-    return isinstance(scene.pressure.profile, str) and (
-        method.mapped or is_linear(scene, method.options.model)
-    )
+    return method.mapped or is_linear(scene, method.options.model)
 
 
 def is_linear(scene: Scene, name: str) -> bool:
