@@ -383,7 +383,7 @@ def _interpolation(probes: Floats, knots: Floats, spot: GaussianSum) -> tuple[Fl
     steps = spline_steps(furthest(probes, knots, spot) / spot.width)
     table: Floats = spot.width / STEPS_PER_WIDTH * np.arange(steps, dtype=np.float64)
     flat = (1, np.zeros(steps))
-    return table, CubicSpline(table, np.eye(steps), bc_type=(flat, "not-a-knot"))
+    return np.asarray(table), CubicSpline(table, np.eye(steps), bc_type=(flat, "not-a-knot"))
 
 
 def furthest(probes: Floats, knots: Floats, spot: GaussianSum) -> float:

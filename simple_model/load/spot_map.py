@@ -164,7 +164,9 @@ def _centred(x: Floats, y: Floats, values: Floats, **source: Any) -> tuple[SpotM
     """The map about and relative to the maximum of its splines, and this maximum."""
     spline, k = _spline(x, y, values), np.divmod(values.argmax(), len(y))
     low, high = (
-        np.array([each[np.clip(i + step, 0, len(each) - 1)] for each, i in zip((x, y), k)])
+        np.array(
+            [each[np.clip(i + step, 0, len(each) - 1)] for each, i in zip((x, y), k, strict=True)]
+        )
         for step in (-1, 1)
     )
     for _ in range(3):  # to 1/4000 of a step
