@@ -110,7 +110,7 @@ def focus_note(pressure: MovingPressure) -> str:
     own = f" (the file gives {spot.peak:.3g} Pa)" if spot.peak > 0 else ""
     return (
         f"focal spot of {Path(spot.file).name or 'a map'}, {spot.source} over the largest value: "
-        f"{x:.3g} mm by {y:.3g} mm at half of it, interpolated within {100 * spot.error:.1g} %, "
+        f"{x:.2g} mm by {y:.2g} mm at half of it, interpolated within {100 * spot.error:.1g} %, "
         f"{1e3 * spot.area * pressure.peak_pressure:.3g} mN at {pressure.peak_pressure:.3g} Pa{own}"
     )
 
@@ -135,7 +135,9 @@ def read_image(path: Path) -> dict[str, np.ndarray]:
         places = (grid if grid.point_data else grid.cell_centers()).points
         arrays = {name: np.asarray(data[name], np.float64) for name in data}
     except Exception:  # VTK raises many types
-        raise MeshError(f"{path} is damaged or no image; write it again") from None
+        arrays = {}
+    if not arrays:  # VTK reads a file that is cut short as an empty one
+        raise MeshError(f"{path} is damaged or no image with arrays; write it again")
     split = {name: a @ [1, 1j] if a.ndim == 2 and a.shape[1] == 2 else a
              for name, a in arrays.items()}  # fmt: skip
     own = {name: array for name, array in split.items() if array.ndim == 1}
@@ -294,15 +296,13 @@ def _pressures(columns: list[_Column]) -> tuple[Floats, float, str]:
     return np.abs(stored) ** 2, amplitude**2 / (AIR_DENSITY * SPEED_OF_SOUND**2), f"{words} squared"
 
 
-def _lines(places: Floats, jitter: float = 2.0) -> tuple[Floats, np.ndarray]:
-    """Return the distinct coordinates (k,) in m, ascending, and the index (n,) of each place.
-
-    Places of a scan differ a little: by less than `jitter` times their range over their number,
-    a twentieth of a step of 40 x 40.
+def _lines(places: Floats, jitter: float = 0.05) -> tuple[Floats, np.ndarray]:
+    """Return the distinct coordinates (k,) in m, ascending, and the index (n,) of each place; those
+    of a scan differ by less than a fraction `jitter` of the largest step.
     """
     order = np.argsort(places, kind="stable")
     apart = np.diff(places[order], prepend=places[order[:1]])
-    number = np.cumsum(apart > jitter * np.ptp(places) / len(places))
+    number = np.cumsum(apart > jitter * apart.max())
     index = np.empty(len(places), int)
     index[order] = number
     return np.bincount(index, places) / np.bincount(index), index
