@@ -24,11 +24,22 @@ from simple_model.load.spot_map import SpotMap, spot_map
 from skinwave.typing import Floats
 
 AXES = ("x", "y", "z")
-SOUND, LEVEL, INTENSITY, RADIATION = "sound pressure", "level", "intensity", "radiation pressure"
+SOUND, LEVEL = "sound pressure", "sound pressure level"
+INTENSITY, RADIATION = "intensity", "radiation pressure"
 NAMES = {
     **{axis: axis for axis in AXES},
-    **dict.fromkeys(("p", "pressure", "sound_pressure", "acoustic_pressure"), SOUND),
-    **dict.fromkeys(("spl", "lp", "level"), LEVEL),
+    **dict.fromkeys(
+        (
+            "p",
+            "pressure",
+            "sound_pressure",
+            "acoustic_pressure",
+            "total_acoustic_pressure",
+            "level",
+        ),
+        SOUND,
+    ),
+    **dict.fromkeys(("spl", "lp", "sound_pressure_level"), LEVEL),
     **dict.fromkeys(("i", "intensity", "sound_intensity", "acoustic_intensity"), INTENSITY),
     **dict.fromkeys(("radiation_pressure", "acoustic_radiation_pressure", "arp"), RADIATION),
 }
@@ -146,6 +157,7 @@ def read_image(path: Path) -> dict[str, np.ndarray]:
 
 def _on_grid(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return arrays of one shape (n,); coordinates (nx,) and (ny,) are repeated for maps."""
+    arrays = {name: np.squeeze(a) for name, a in arrays.items()}
     shape = max((a.shape for a in arrays.values() if a.ndim == 2), key=np.prod, default=())
     lines = {name: a.ravel() for name, a in arrays.items()
              if shape and a.size in shape and a.size < np.prod(shape)}  # fmt: skip
@@ -161,7 +173,7 @@ def _on_grid(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         is_x_first = shape == (len(x), len(y))
         at = np.meshgrid(x, y, indexing="ij" if is_x_first else "xy")
         flat |= {axes[axis]: each.ravel() for axis, each in zip("xy", at, strict=True)}
-    length = max(map(len, flat.values()), default=0)
+    length = int(np.prod(shape)) if shape else max(map(len, flat.values()), default=0)
     return {name: array for name, array in flat.items() if len(array) == length}
 
 
@@ -200,6 +212,7 @@ def _column(name: str, values: np.ndarray) -> _Column:
     match = re.fullmatch(r"(.*?)\s*[\[(]([^\[\]()]*)[\])]", text.strip())
     words, unit = (match[1], match[2]) if match and match[2].lower() not in NAMES else (text, "")
     unit, _, more = unit.strip().partition(" ")
+    more = more.partition("re ")[0]  # the reference of a level
     rest = "_".join(re.findall("[a-z0-9]+", f"{words} {more}".lower()))
 
     def take(known: Mapping[str, T], end: str = "") -> T | None:
@@ -250,17 +263,17 @@ def _spot(columns: list[_Column], file: str, unit: str, needs_peak: bool) -> Spo
 def _one(columns: list[_Column], kind: str, part: complex | None = None) -> _Column:
     own = [c for c in columns if c.kind == kind and part in (None, c.part)]
     if len(own) != 1:
-        raise ValueError(f"{len(own)} columns hold {kind}, not one; {MUST}")
+        of = {1.0: "real part of ", 1j: "imaginary part of "}.get(part or 0.0, "")
+        raise ValueError(f"{len(own)} columns hold the {of}{kind}, not one; {MUST}")
     return own[0]
 
 
 def _metres(column: _Column, unit: str) -> Floats:
     """Return coordinates (n,) in m."""
     if bool(unit) == bool(column.unit):
-        twice = f"is in {column.unit}, and unit is set too; remove unit"
-        raise ValueError(
-            f"{column.kind} {twice if unit else 'has no unit; add it to its name, or set unit'}"
-        )
+        both = f"is in {column.unit}, and [focus] has unit = {unit!r}; remove that"
+        none = 'has no unit; add it to its name, or write unit = "mm" below [focus]'
+        raise ValueError(f"{column.kind} {both if unit else none}")
     if (given := unit or column.unit) not in UNITS:
         raise ValueError(f"{column.kind} is in {given[:20]}; use one of {', '.join(UNITS)}")
     return np.asarray(column.values.real * UNITS[given], np.float64)
@@ -278,7 +291,8 @@ def _pressures(columns: list[_Column]) -> tuple[Floats, float, str]:
     is_complex, values = bool(is_split or np.imag(stored).any()), np.real(stored)
     unit, scale = first.unit, SCALES[kind].get(first.unit, 0.0)
     if kind == LEVEL or unit.lower().startswith("db"):
-        per_value = 2 * REFERENCE**2 if kind == LEVEL else 0.0
+        is_absolute = kind == LEVEL and values.max() > 0
+        per_value = 2 * REFERENCE**2 * is_absolute
         per_value *= 10 ** (values.max() / 10) / (AIR_DENSITY * SPEED_OF_SOUND**2)
         return 10 ** ((values - values.max()) / 10), per_value, f"{kind} in dB"
     if kind == RADIATION:

@@ -57,7 +57,7 @@ WRITERS = {
         2**0.5 * RMS * PHASE.real, 2**0.5 * RMS * PHASE.imag, separator="   ")
     ),
     "level.tsv": lambda path: path.write_text(
-        table("x_mm\ty_mm\tspl [dB]", 20 * np.log10(RMS / 20e-6), separator="\t")
+        table("x_mm\ty_mm\tspl [dB re 20 µPa]", 20 * np.log10(RMS / 20e-6), separator="\t")
     ),
     "intensity.csv": lambda path: path.write_text(
         table("x_mm y_mm intensity_w_m2", RMS**2 / (1.2 * 343), separator=" ")
@@ -197,10 +197,12 @@ def test_a_scene_with_a_map_is_written_and_known_by_its_numbers(tmp_path):
 
 
 def test_a_map_without_a_unit_of_pressure_keeps_the_peak_of_the_scene(tmp_path):
-    (tmp_path / "rms.csv").write_text(table("x [mm],y [mm],p [mV]", RMS / 7))
-    scene = scene_of('preset = "skin-slab"', MAP, tmp_path)
-    assert scene.pressure.peak_pressure == MovingPressure.peak_pressure
-    assert scene.pressure.profile(np.array([W, 0.0])) == pytest.approx(np.exp(-0.5), abs=1e-3)
+    relative = 20 * np.log10(RMS / RMS.max())
+    for name, values in (("p [mV]", RMS / 7), ("level [dB]", relative), ("spl [dB]", relative)):
+        (tmp_path / "rms.csv").write_text(table(f"x [mm],y [mm],{name}", values))
+        scene = scene_of('preset = "skin-slab"', MAP, tmp_path)
+        assert scene.pressure.peak_pressure == MovingPressure.peak_pressure
+        assert scene.pressure.profile(np.array([W, 0.0])) == pytest.approx(np.exp(-0.5), abs=1e-3)
 
 
 def cut(half):
@@ -224,7 +226,8 @@ REFUSED = {
     "x is in furlong": table("x [furlong],y [mm],p_rms [Pa]", RMS),
     "no line of names": table(NAMES, RMS).split("\n", 1)[1],
     "no column has a known name": table("x [mm],y [mm],v [Pa]", RMS),
-    "2 columns hold sound pressure": table(NAMES + ",p_rms_pa", RMS, RMS),
+    "2 columns hold the sound pressure": table(NAMES + ",p_rms_pa", RMS, RMS),
+    "0 columns hold the imaginary part": table("x [mm],y [mm],Re(p) [Pa]", RMS),
     "several values of z": table("x [mm],y [mm],z [mm],p_rms [Pa]", X + Y, RMS),
     "row 3 does not have 3 numbers": table(NAMES, RMS).replace("\n", "\n1,2\n").replace(
         "\n1,2\n", "\n", 2),
@@ -247,7 +250,7 @@ def test_what_is_no_map_of_a_focus_is_refused(said, tmp_path, capsys):
     ("focus", "said"),
     [
         (MAP + "height_mm = 150", "height_mm does not apply"),
-        (MAP + 'unit = "mm"', "remove unit"),
+        (MAP + 'unit = "mm"', "remove that"),
         (MAP.replace('file = "rms.csv"', ""), "without file"),
         (MAP.replace("rms.csv", "missing.csv"), "missing.csv: cannot be read"),
         (MAP.replace("rms.csv", "half.vti"), "is damaged"),
