@@ -1,4 +1,4 @@
-"""Convert a pattern between file formats: scene, AdapTics, CSV, WAV, pyautd3."""
+"""Convert a pattern between file formats: scene, AdapTics, CSV, WAV, AUTD3."""
 
 import argparse
 from math import isfinite
@@ -29,6 +29,10 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="value of a parameter of an AdapTics file; may be repeated",
     )  # fmt: skip
     add("--resize", type=float, default=1.0, metavar="FACTOR", help="multiply the path by a factor")
+    add(
+        "--package", default="pyautd3", help="package that plays a script: pyautd3 (default) or "
+        "autd3, 0.12 or later",
+    )  # fmt: skip
     add("--overwrite", action="store_true", help="replace an existing file")
     add_reporting(parser)
 
@@ -42,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     choices = Options(
         rate=options.rate, height=metre(options.height), hold=options.hold, role=options.role,
         scale=options.scale, parameters=dict(map(_parameter, options.parameter)),
-        resize=options.resize,
+        resize=options.resize, package=options.package,
     )  # fmt: skip
     base = read(options.scene) if options.scene else None
     inputs = [options.source, *([options.scene] if options.scene else [])]

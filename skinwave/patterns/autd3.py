@@ -1,4 +1,5 @@
-"""Writer of a Python script that plays a Tacton on AUTD3 devices with FociSTM of pyautd3.
+"""Writer of a Python script that plays a Tacton on AUTD3 devices with FociSTM, by the package autd3
+(0.12 and later, asyncio) or its predecessor pyautd3.
 
 The device steps through a list of foci at 40 kHz / N and repeats it, so that its drawing frequency
 is 40 kHz / (N points). The script uses the nearest such frequency.
@@ -9,6 +10,7 @@ from math import ceil
 import numpy as np
 
 from simple_model import MovingPressure
+from simple_model.choices import choose
 from skinwave.patterns.pattern import Options, aliasing_notes, loudness
 from skinwave.scene.scene import Scene
 from skinwave.system.formats import PATTERN_WRITERS, register
@@ -23,18 +25,89 @@ MODULATION = 10  # ticks a sample: 4 kHz
 RESOLUTION = 0.025  # mm, of positions in devices
 
 
-def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """Return the script, and notes on its approximations; raise a ValueError if the path is too
-    slow, or if no sound produces the load.
+PYAUTD3 = (
     """
+# Replace Nop by the link of your devices.
+
+import time
+
+import numpy as np
+from pyautd3 import AUTD3, ControlPoint, ControlPoints, Controller, FociSTM, Null
+from pyautd3 import SamplingConfig, Silencer
+from pyautd3.link.nop import Nop
+from pyautd3.modulation import Custom
+""",
+    """
+with Controller.open([AUTD3(pos=[0.0, 0.0, 0.0], rot=[1, 0, 0, 0])], Nop()) as autd:
+    centre = autd.center()
+    foci = [
+        ControlPoints([ControlPoint(centre + np.array([x, y, HEIGHT])) for x, y in pattern])
+        for pattern in PLACES
+    ]
+    autd.send(Silencer.disable())
+    modulation = Custom(np.array(MODULATION, dtype=np.uint8), SamplingConfig(MODULATION_TICKS))
+    autd.send((modulation, FociSTM(foci, SamplingConfig(PATTERN_TICKS))))
+    time.sleep(DURATION)
+    autd.send(Null())
+""",
+)
+AUTD3 = (
+    """
+# Replace emulator.option() by UdpOption() for devices; pip install autd3 autd3-modulation.
+
+import asyncio
+
+import numpy as np
+from autd3 import Client, ClientConfig, UdpEmulator
+from autd3.commands import FociStm, FociStmOption, Modulation, SetSilencer
+from autd3.geometry import Autd3, Geometry
+from autd3.value import ControlPoint, ControlPoints, SamplingConfig
+from autd3_modulation import ModulationBuffer
+""",
+    """
+
+def commands(geometry):
+    centre = geometry.center()
+    foci = [
+        ControlPoints([ControlPoint(centre + np.array([x, y, HEIGHT]), 0) for x, y in pattern], 255)
+        for pattern in PLACES
+    ]
+    samples = ModulationBuffer.from_bytes(MODULATION)
+    modulation = Modulation(SamplingConfig(MODULATION_TICKS), samples)
+    return [modulation, FociStm(SamplingConfig(PATTERN_TICKS), foci, FociStmOption())]
+
+
+async def play():
+    geometry, emulator = Geometry([Autd3()]), UdpEmulator(1)
+    async with await Client.open(geometry, emulator.option(), ClientConfig()) as client:
+        await client.send(SetSilencer.disable())
+        await client.send(commands(geometry))
+        await asyncio.sleep(DURATION)
+        await client.silent_stop()
+
+
+if __name__ == "__main__":
+    asyncio.run(play())
+""",
+)
+PACKAGES = {"pyautd3": PYAUTD3, "autd3": AUTD3}
+
+
+def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
+    """Return the script, and notes on its approximations; raise a ValueError if the package is
+    unknown, if the path is too slow, or if no sound produces the load.
+    """
+    choose("--package", options.package, PACKAGES)
     pressure, path = scene.pressure, scene.tacton.trajectory
     foci, in_turn = len(scene.tacton.foci), scene.tacton.sharing == "time_multiplexed"
     count, division = steps(path.drawing_frequency, foci if in_turn else 1)
     places = _places(pressure, count, in_turn=in_turn and foci > 1)
     samples, ticks = _modulation(pressure, path.drawing_frequency)
     drawn = TICK / division / count if not path.is_static else 0.0
+    apart = np.linalg.norm(np.roll(places, -foci if in_turn else -1, axis=0) - places, axis=2).max()
     notes = [
-        f"{count} patterns of {places.shape[1]} foci, one every {division} ticks of 40 kHz",
+        f"{count} patterns of {places.shape[1]} foci, one every {division} ticks of 40 kHz, each "
+        f"focus up to {apart:.3g} mm from its last place",
         f"drawing frequency {drawn:.6g} Hz in place of {path.drawing_frequency:.6g} Hz",
         f"the device rounds positions to {RESOLUTION:g} mm",
     ]
@@ -43,7 +116,27 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     if len(samples) > 1:
         notes.append(f"modulation: {len(samples)} samples at {TICK / ticks:g} Hz with 8 bits")
     notes += aliasing_notes(scene.tacton, TICK / ticks)
-    return _script(scene, places, division, samples, ticks, notes).encode(), tuple(notes)
+    if pressure.profile_name == "file":
+        notes.append("the map of the focus does not say its height; check HEIGHT")
+    imports, body = PACKAGES[options.package]
+    values = {
+        "HEIGHT": 1e3 * pressure.height, "DURATION": scene.tacton.duration,
+        "PATTERN_TICKS": division, "MODULATION_TICKS": ticks,
+    }  # fmt: skip
+    name = scene.name.encode("unicode_escape").decode().replace('"', "'")
+    script = [
+        f'"""{name}: {scene.tacton.duration:g} s on AUTD3 devices, by {options.package}."""',
+        *(f"# {note}." for note in notes),
+        "# HEIGHT is in mm above the array, DURATION in s, and MODULATION in 1/255 of full drive.",
+        imports[1:],
+        *(f"{word} = {value!r}" for word, value in values.items()),
+        "PLACES = [  # mm from the centre: patterns, foci, (x, y)",
+        *("    [" + ", ".join(f"[{x:.3f}, {y:.3f}]" for x, y in each) + "]," for each in places),
+        "]",
+        f"MODULATION = {samples.tolist() * (2 if len(samples) == 1 else 1)}",
+        body[:-1],
+    ]
+    return "\n".join([*script, ""]).encode(), tuple(notes)
 
 
 def steps(frequency: float, multiple: int = 1) -> tuple[int, int]:
@@ -89,46 +182,6 @@ def _modulation(pressure: MovingPressure, f_d: float) -> tuple[np.ndarray, int]:
             )
     samples = np.round(255 * loud).astype(int)
     return (samples[:1] if np.ptp(loud) < 1e-12 else samples), ticks
-
-
-def _script(
-    scene: Scene, places: Floats, division: int, samples: np.ndarray, ticks: int, notes: list[str]
-) -> str:
-    points = ",\n".join(
-        "    [" + ", ".join(f"[{x:.3f}, {y:.3f}]" for x, y in pattern) + "]" for pattern in places
-    )
-    name = scene.name.encode("unicode_escape").decode().replace('"', "'")
-    comments = "\n".join(f"# {note}." for note in notes)
-    return f'''"""{name}: {scene.tacton.duration:g} s on AUTD3 devices, by pyautd3 38."""
-{comments}
-# Replace Nop by the link of your devices.
-
-import time
-
-import numpy as np
-from pyautd3 import AUTD3, ControlPoint, ControlPoints, Controller, FociSTM, Null
-from pyautd3 import SamplingConfig, Silencer
-from pyautd3.link.nop import Nop
-from pyautd3.modulation import Custom
-
-HEIGHT = {1e3 * scene.pressure.height!r}  # mm above the array
-PLACES = [  # mm from the centre: patterns, foci, (x, y)
-{points},
-]
-MODULATION = {samples.tolist() * (2 if len(samples) == 1 else 1)}  # of 255, full drive
-
-with Controller.open([AUTD3(pos=[0.0, 0.0, 0.0], rot=[1, 0, 0, 0])], Nop()) as autd:
-    centre = autd.center()
-    foci = [
-        ControlPoints([ControlPoint(centre + np.array([x, y, HEIGHT])) for x, y in pattern])
-        for pattern in PLACES
-    ]
-    autd.send(Silencer.disable())
-    modulation = Custom(np.array(MODULATION, dtype=np.uint8), SamplingConfig({ticks}))
-    autd.send((modulation, FociSTM(foci, SamplingConfig({division}))))
-    time.sleep({scene.tacton.duration!r})
-    autd.send(Null())
-'''
 
 
 register(PATTERN_WRITERS, ".py", function=write)

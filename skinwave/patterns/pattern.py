@@ -44,6 +44,7 @@ class Options:
         the root mean square of a full sine
     parameters : values of parameters of an AdapTics file, replace their defaults
     resize : factor of all positions of the path, about the origin
+    package : "pyautd3" or "autd3", which plays a script
     """
 
     rate: float | None = None
@@ -53,6 +54,7 @@ class Options:
     scale: str = "full"
     parameters: Mapping[str, float] = field(default_factory=dict)
     resize: float = 1.0
+    package: str = "pyautd3"
 
 
 def onto(base: Scene, pattern: Pattern, name: str) -> Scene:

@@ -1,8 +1,10 @@
 """Pattern files: import, export and round trip; what is malformed is refused in one line."""
 
+import asyncio
 import io
 import json
 import re
+import runpy
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +29,7 @@ WRONG_COMMANDS = (
     "missing.csv out.toml", "good.csv out.mp3", "good.csv out.toml --height 900",
     "good.csv out.csv --rate 1e6", "good.csv out.wav", "good.csv out.toml --scene missing.toml",
     "good.wav out.toml --role sound", "good.wav out.toml --scale loud",
-    "good.wav out.toml --role envelope",
+    "good.wav out.toml --role envelope", "good.csv out.py --package autd",
 )  # fmt: skip
 POINT = brush(radius=0.0)
 FADING = Trajectory(
@@ -307,6 +309,60 @@ def test_the_script_states_its_frequency_and_holds_its_foci():
         )  # 255 (1 + sin) / 2, of which the load is the square
         assert max(sound) == 255
         assert np.mean(sound) == pytest.approx(127.5, abs=1)
+
+
+def played(script, tmp_path):
+    path = tmp_path / "play.py"
+    path.write_bytes(script)
+    return runpy.run_path(str(path))
+
+
+def test_autd3_plays_the_script_of_its_package(tmp_path):
+    """The link is the emulator of the device."""
+    pytest.importorskip("autd3")
+    pytest.importorskip("autd3_modulation")
+    for tacton in (
+        Tacton(duration=0.02), Tacton(trajectory=CIRCLE, am_frequency=80, duration=0.02),
+        Tacton(trajectory=CIRCLE, foci=tuple(np.arange(8) / 8), duration=0.02),
+        Tacton(trajectory=FADING, duration=0.1),
+    ):  # fmt: skip
+        script, _ = write_pattern(flat(tacton), ".py", Options(package="autd3"))
+        asyncio.run(played(script, tmp_path)["play"]())
+
+
+def test_what_autd3_emits_arrives_in_phase_at_the_focus_as_strong_as_commanded(tmp_path):
+    emulator = pytest.importorskip("autd3_emulator")
+    from autd3 import Duration
+    from autd3.commands import SetSilencer
+    from autd3.geometry import Autd3, Geometry
+
+    tacton = Tacton(trajectory=CIRCLE, am_frequency=80, duration=0.1)
+    script, notes = write_pattern(flat(tacton), ".py", Options(package="autd3"))
+    own, geometry = played(script, tmp_path), Geometry([Autd3()])
+    ticks = 400
+
+    def send(recorder):
+        for command in (SetSilencer.disable(), *own["commands"](geometry)):
+            recorder.send(command)
+        recorder.tick(Duration.from_micros(25 * ticks))
+
+    record = emulator.Emulator(geometry).record(send)
+    phases = 2 * np.pi / 256 * record.phase().to_numpy()  # transducers, ticks
+    sources = geometry.device(0).positions() - geometry.center()
+
+    def coherence(tick, place):
+        distances = np.linalg.norm(sources - [*place, 200.0], axis=1)
+        return abs(np.exp(1j * (phases[:, tick] + 2 * np.pi * distances / 8.5)).mean())  # 340 m/s
+
+    angles = 2 * np.pi * 191.388 * np.arange(ticks) / 40e3
+    for tick in (0, 57, 150, 333):
+        place = 10 * np.array([np.cos(angles[tick]), np.sin(angles[tick])])
+        assert coherence(tick, place) > 0.98
+        assert coherence(tick, -place) < 0.3
+    sound = np.sin(np.pi * record.pulse_width().to_numpy()[0] / 512)
+    wanted = np.repeat(own["MODULATION"], own["MODULATION_TICKS"])[:ticks] / 255
+    np.testing.assert_allclose(sound, wanted, atol=0.01)
+    assert any("up to 0.3 mm from its last place" in note for note in notes)
 
 
 def eval_list(script, name):
