@@ -117,9 +117,7 @@ def load_arrays(path: PathLike) -> dict[str, Array]:
             with np.load(file, allow_pickle=False) as archive:
                 return {name: archive[name] for name in archive.files}
         except Exception as error:  # damaged archives raise many types
-            raise ValueError(
-                f"{path}: cannot be read ({_reason(error)}); compute the result again"
-            ) from None
+            raise ValueError(f"{path}: cannot be read ({_reason(error)}); write it again") from None
 
 
 def load_json(path: PathLike) -> Any:

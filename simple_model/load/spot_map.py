@@ -83,7 +83,7 @@ class SpotMap:
     @cached_property
     def spacing(self) -> float:
         """Length in m that samples must resolve: that of a Gaussian with the same mean slope."""
-        u, v = (np.linspace(each[0], each[-1], 4 * len(each)) for each in (self.x, self.y))
+        u, v = (np.linspace(each[0], each[-1], 2 * len(each)) for each in (self.x, self.y))
         of, along_x, along_y = (
             np.mean(self._spline(u, v, dx=n, dy=m) ** 2) for n, m in ((0, 0), (1, 0), (0, 1))
         )
@@ -97,11 +97,13 @@ class SpotMap:
     @property
     def half_widths(self) -> tuple[float, float]:
         """Widths in m along x and y through the focus, at half of its pressure."""
-        u, v = (np.linspace(each[0], each[-1], 4001) for each in (self.x, self.y))
+        u, v = (np.linspace(each[0], each[-1], 40_001) for each in (self.x, self.y))
         cuts = (u, self._spline(u, 0.0)[:, 0]), (v, self._spline(0.0, v)[0])
-        low = [at[cut < 0.5] for at, cut in cuts]
-        width_x, width_y = (float(at[at > 0].min() - at[at < 0].max()) for at in low)
-        return width_x, width_y
+        widths = []
+        for at, cut in cuts:
+            low = at[cut < 0.5]
+            widths.append(float(low[low > 0].min() - low[low < 0].max() - (at[1] - at[0])))
+        return widths[0], widths[1]
 
     @cached_property
     def gaussians(self) -> GaussianSum:

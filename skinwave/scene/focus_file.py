@@ -121,7 +121,7 @@ def focus_note(pressure: MovingPressure) -> str:
     own = f" (the file gives {spot.peak:.3g} Pa)" if spot.peak > 0 else ""
     return (
         f"focal spot of {Path(spot.file).name or 'a map'}, {spot.source} over the largest value: "
-        f"{x:.2g} mm by {y:.2g} mm at half of it, interpolated within {100 * spot.error:.1g} %, "
+        f"{x:.3g} mm by {y:.3g} mm at half of it, interpolated within {100 * spot.error:.1g} %, "
         f"{1e3 * spot.area * pressure.peak_pressure:.3g} mN at {pressure.peak_pressure:.3g} Pa{own}"
     )
 
