@@ -155,7 +155,7 @@ def _limits(scene: Scene) -> Iterator[Limit]:
         yield from isotropic_limits(body)
     if gaussian_sum(pressure.height, pressure.profile) is None:
         yield Limit(
-            why=f"needs a Gaussian focus or a map of one, not the profile {pressure.profile_name}",
+            why=f"needs a Gaussian focus or a map, not the profile {pressure.profile_name}",
             cure='set profile = "gaussian"',
             change=lambda scene: replace(
                 scene, pressure=replace(scene.pressure, profile="gaussian")

@@ -5,9 +5,11 @@ The names of the columns or arrays say what they hold and in which unit: `x [mm]
 of amplitude |p| or of intensity I exerts |p|^2/(rho c^2) or 2 I/c.
 """
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -85,12 +87,20 @@ def read_spot(path: str | Path, unit: str = "", *, needs_peak: bool = False) -> 
     may be an RMS value or an amplitude.
     """
     path = Path(path)
+    with reading.open_regular(path) as file:
+        written = os.fstat(file.fileno())
     try:
-        columns = [_column(name, values) for name, values in _read(path).items()]
-        return _spot(columns, str(path), unit, needs_peak)
+        return _read_spot(path, written.st_mtime_ns, written.st_size, unit, needs_peak)
     except ValueError as error:
         said = str(error)
         raise ValueError(said if said.startswith(str(path)) else f"{path}: {said}") from None
+
+
+@lru_cache(maxsize=4)  # the scenes of a sweep read the same file
+def _read_spot(path: Path, modified: int, size: int, unit: str, needs_peak: bool) -> SpotMap:
+    """The same for a file that was modified at a time in ns and has a size in bytes."""
+    columns = [_column(name, values) for name, values in _read(path).items()]
+    return _spot(columns, str(path), unit, needs_peak)
 
 
 def with_spot(values: dict[str, Any]) -> dict[str, Any]:
@@ -131,8 +141,7 @@ def _read(path: Path) -> Mapping[str, np.ndarray]:
     if path.suffix.lower() == ".npz":
         return _on_grid(reading.load_arrays(path))
     if path.suffix.lower() in IMAGES:
-        with reading.open_regular(path):
-            return subprocess_call.call_reader(read_image, path)
+        return subprocess_call.call_reader(read_image, path)
     return _table(reading.read_exported_text(path))
 
 
