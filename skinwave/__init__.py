@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # what readers of types and editors see of the names below
     from skinwave.scene.load import SupportMotion
     from skinwave.scene.scene import BODIES, Body, Load, Scene, Sides
     from skinwave.sweeps.best import Best
-    from skinwave.sweeps.in_python import SweepTable, best_value, read_sweep, sweep
+    from skinwave.sweeps.in_python import SweepTable, best_value, best_values, read_sweep, sweep
     from skinwave.system.effort import SkinwaveWarning
 
 _HOMES = {
@@ -51,15 +51,16 @@ _HOMES = {
     "paper": "report.styles",
     "sweep": "sweeps.in_python",
     "best_value": "sweeps.in_python",
+    "best_values": "sweeps.in_python",
     "read_sweep": "sweeps.in_python",
     "Best": "sweeps.best",
     "SweepTable": "sweeps.in_python",
 }
 __all__ = [
     "BODIES", "Agreement", "Best", "Body", "Field", "Load", "ParametricBody", "Plan", "Scene",
-    "Sides", "SkinwaveWarning", "SolveOptions", "SupportMotion", "SweepTable", "best_value", "cite",
-    "compare", "dumps", "field", "loads", "paper", "plan", "prepare", "read", "read_sweep",
-    "simulate", "sweep",
+    "Sides", "SkinwaveWarning", "SolveOptions", "SupportMotion", "SweepTable", "best_value",
+    "best_values", "cite", "compare", "dumps", "field", "loads", "paper", "plan", "prepare", "read",
+    "read_sweep", "simulate", "sweep",
 ]  # fmt: skip
 
 

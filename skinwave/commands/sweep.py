@@ -1,11 +1,13 @@
 """Simulate many scenes on all cores or a cluster, and write one table."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from skinwave.commands.common import (
     add_mesh,
@@ -19,6 +21,9 @@ from skinwave.commands.common import (
     with_failures,
 )
 from skinwave.system.plain_text import say
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg", "pdf")
 
@@ -45,8 +50,8 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=int, default=0, help="seed of the samples (default: 0)")
     add(
         "--best", metavar="COLUMN",
-        help="find the value of the varied key at which a column such as level_db[0] is largest, "
-        "and its 95 %% interval under the distributions of the scene",
+        help="find the values of one or two varied keys at which a column such as level_db[0] is "
+        "largest, and their 95 %% intervals under the distributions of the scene; --plot draws it",
     )  # fmt: skip
     add("-o", "--out", type=Path, metavar="DIR", help="folder of the table")
     add(
@@ -85,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
     engine.check(options.scheduler)
     summary: dict[str, Any] = {}
     lines: list[str] = []
-    out, missing, failures = options.scene, 0, dict[str, str]()
+    out, missing, failures, figures = options.scene, 0, dict[str, str](), dict[str, Any]()
     if options.scene.is_dir():
         if options.vary or not (options.csv or options.plot is not None):
             raise ValueError(
@@ -95,13 +100,13 @@ def run(options: argparse.Namespace) -> int:
         failures = dataset.failures_of(dataset.read(out))
     else:
         out = options.out or Path(f"{options.scene.stem}-sweep")
-        summary, lines, failures = _sweep(options, out)
+        summary, lines, failures, figures = _sweep(options, out)
         missing = summary["missing"]
     if missing < summary.get("planned", 1):
         if options.csv:
             dataset.write_beside(out, {dataset.CSV: dataset.csv_of(dataset.read(out))})
         if options.plot is not None:
-            summary["figures"] = _draw(options, out)
+            summary["figures"] = _draw(options, out, figures)
             lines += [f"wrote {path}" for path in summary["figures"]]
     summary["failures"] = failures
     summarise(options, summary, "\n".join(with_failures(failures, lines)))
@@ -110,23 +115,25 @@ def run(options: argparse.Namespace) -> int:
 
 def _sweep(
     options: argparse.Namespace, out: Path
-) -> tuple[dict[str, Any], list[str], dict[str, str]]:
-    """Run the missing points of the design; return a summary, sentences and failures."""
+) -> tuple[dict[str, Any], list[str], dict[str, str], dict[str, Figure]]:
+    """Run the missing points of the design; return a summary, sentences, failures and figures."""
     from skinwave.models.options import SolveOptions
+    from skinwave.report.styles import style
     from skinwave.results import record
     from skinwave.scene.distributions import Spread
     from skinwave.scene.variation import SAMPLED, cases, combinations, parse
     from skinwave.sweeps import best, dataset, uncertainty_page
     from skinwave.sweeps.sweep import Sweep
+    from skinwave.sweeps.table_figures import best_figure
 
     check_seed(options.seed)
     is_sampled = options.design in SAMPLED
     if options.best and is_sampled:
         raise ValueError(f"--best needs a grid of values; remove --design {options.design}")
     variations = [parse(text) for text in options.vary]
-    grid = best.check(variations, options.samples) if options.best else None
+    grids = best.check(variations, options.samples) if options.best else []
     combined = combinations(
-        variations, options.design, None if grid else options.samples, options.seed
+        variations, options.design, None if grids else options.samples, options.seed
     )
     spreads = [each for each in variations if is_sampled and isinstance(each, Spread)]
     has_page = len(spreads) == len(variations)
@@ -136,7 +143,8 @@ def _sweep(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
     points = cases(options.scene, combined)
-    optimum, files, failures = None, list[str](), dict[str, str]()
+    optimum, files, failures = tuple[best.Best, ...](), list[str](), dict[str, str]()
+    figures = dict[str, Any]()
     with progress_of(options) as progress:
         sweep = Sweep(
             folder=out, points=partial(cases, options.scene), options=solving, progress=progress,
@@ -146,8 +154,8 @@ def _sweep(
         outcome = sweep.run(points)
         if outcome.planned > outcome.missing:
             failures |= dataset.failures_of(sweep.rows(points, dataset.OUTCOME))
-        if grid and not outcome.missing:
-            optimum = best.find_best(sweep, grid, options.best, options.samples, options.seed)
+        if grids and not outcome.missing:
+            optimum = best.find_best(sweep, grids, options.best, options.samples, options.seed)
     if has_page and not outcome.missing:
         files = uncertainty_page.write_uncertainty(
             out, sweep.rows(points), spreads, has_indices=options.design == "sobol"
@@ -167,15 +175,22 @@ def _sweep(
         + (f", percentiles in {out}/{files[-1]}" if files else "")
     ]
     if optimum:
-        summary["best"] = asdict(optimum) | {"is_at_end": optimum.is_at_end}
-        lines.insert(0, optimum.words)
-        if optimum.failed:
-            failures[f"{optimum.failed} samples"] = f"no number in column {optimum.column}"
-    return summary, lines, failures
+        summary["best"] = [
+            {name: x for name, x in asdict(each).items() if name != "drawn"}
+            | {"is_at_end": each.is_at_end}
+            for each in optimum
+        ]
+        lines.insert(0, best.words(optimum))
+        if optimum[0].failed:
+            failures[f"{optimum[0].failed} samples"] = f"no number in column {options.best}"
+        if options.plot is not None:
+            chosen = style(options.style, options.width)
+            figures[f"best {options.best}"] = best_figure(sweep.rows(points), optimum, chosen)
+    return summary, lines, failures, figures
 
 
-def _draw(options: argparse.Namespace, out: Path) -> list[str]:
-    """Draw columns of a sweep's table; return the paths of the figures."""
+def _draw(options: argparse.Namespace, out: Path, figures: dict[str, Figure]) -> list[str]:
+    """Draw columns of a sweep's table, and write these and other figures; return their paths."""
     from skinwave.report.figures import figure_file
     from skinwave.report.styles import style
     from skinwave.results.files import distinct_names
@@ -191,8 +206,7 @@ def _draw(options: argparse.Namespace, out: Path) -> list[str]:
     by = options.by or next((key for key in keys if key != x), None)
     if options.heat and not by:
         raise ValueError(f"only {x} varies in {out}, but a map needs two keys; remove --heat")
-    figures = {}
-    for column in options.plot or ["peak_um"]:
+    for column in options.plot or ([] if figures else ["peak_um"]):
         name = f"{column} over {x}" + (f" and {by}" if by else "")
         if options.heat and by:
             figures[f"{name} map"] = heat_figure(rows, column, x, by, chosen)

@@ -1,15 +1,17 @@
-"""Best value of a varied key: where a column of the sweep's table is largest, with the interval
-under the spreads of the scene.
+"""Best values of one or two varied keys: where a column of the sweep's table is largest, with
+intervals under the spreads of the scene.
 
-The best point of a grid and its neighbours define a parabola, and a run at its vertex refines the
-best value. Each sample of the spreads has a best value of its own, computed in the same way. The
-interval contains 95 % of them, extended at each end by their accuracy, a tenth of a grid step.
+The best point of a grid and its neighbours define a quadratic function, and a run at its maximum
+refines the best values. Each sample of the spreads has best values of its own, computed in the same
+way. An interval contains 95 % of those of a key, extended at each end by their accuracy, a tenth of
+a grid step.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize
 
 from simple_model.choices import choose
 from simple_model.numbers import significant
@@ -26,14 +28,14 @@ from skinwave.typing import Floats
 
 SAMPLES, FEWEST_SAMPLES = 199, 39  # by default; for a 95 % interval
 ENDS = (2.5, 97.5)  # percentiles at the ends of the interval
-REFINEMENTS = 2  # runs at vertices
+REFINEMENTS = 2  # runs at vertices, for each key
 ACCURACY = 0.1  # of a best value, in steps of the grid
 FOLDER = "samples"  # of the sweep of the samples, in that of the sweep
 
 
 @dataclass(frozen=True, kw_only=True)
 class Best:
-    """Best value of a key.
+    """Best value of a key, with the best values of the other keys of a search.
 
     Parameters
     ----------
@@ -44,6 +46,7 @@ class Best:
         affects the column
     samples, failed : int, number of samples, and of others without a number in the column
     uncertain : keys of the sampled numbers
+    drawn : best value of each sample
 
     >>> best = Best(key="tacton.size_mm", column="rms_um[0]", value=14, result=3.2, limits=(5, 20))
     >>> best.is_at_end
@@ -59,73 +62,87 @@ class Best:
     samples: int = 0
     failed: int = 0
     uncertain: tuple[str, ...] = ()
+    drawn: tuple[float, ...] = ()
 
     @property
     def is_at_end(self) -> bool:
         """Whether the best value is an end of the range; a better one may lie beyond."""
         return self.value in self.limits
 
-    @property
-    def words(self) -> str:
-        """The best value and its interval in one or two sentences."""
-        end = ", an end of the range," if self.is_at_end else ""
-        text = f"{self.key} = {significant(self.value)}{end} gives the largest {self.column}, "
-        text += significant(self.result)
-        if self.interval is None:
-            return f"{text}; no interval, because no uncertain number of the scene affects it"
-        low, high = map(significant, self.interval)
-        text += f"; 95 % interval {low} to {high}, from {self.samples} samples of "
-        text += ", ".join(self.uncertain)
-        if set(self.interval) & set(self.limits):
-            text += ". The interval reaches an end of the range: widen the range"
-        return text
-
     def __repr__(self) -> str:
-        return f"<Best: {self.words}>"
+        return f"<Best: {words([self])}>"
 
 
-def check(variations: Sequence[Variation], samples: int | None = None) -> Choice:
-    """Return the one varied key and its grid; raise a ValueError if there is none."""
+def words(bests: Sequence[Best]) -> str:
+    """Return the best values of a search and their intervals in one or more sentences."""
+    first, several = bests[0], len(bests) > 1
+    text = " and ".join(
+        f"{best.key} = {significant(best.value)}" + ", an end of the range," * best.is_at_end
+        for best in bests
+    )
+    text += f" {'give' if several else 'gives'} the largest {first.column}, "
+    text += significant(first.result)
+    if first.interval is None:
+        return f"{text}; no interval, because no uncertain number of the scene affects it"
+    text += f"; 95 % {'intervals' if several else 'interval'} "
+    text += " and ".join(" to ".join(map(significant, best.interval or ())) for best in bests)
+    text += f", from {first.samples} samples of {', '.join(first.uncertain)}"
+    for best in bests:
+        if {*(best.interval or ())} & {*best.limits}:
+            text += f". The interval of {best.key} reaches an end of the range: widen the range"
+    return text
+
+
+def check(variations: Sequence[Variation], samples: int | None = None) -> list[Choice]:
+    """Return the one or two varied keys and their grids; raise a ValueError for other designs."""
     if samples is not None and samples < FEWEST_SAMPLES:
         raise ValueError(
             f"{samples} samples are too few for a 95 % interval; give {FEWEST_SAMPLES} or more"
         )
-    if len(variations) != 1:
+    if not 1 <= len(variations) <= 2:
         raise ValueError(
-            f"a best value needs one varied key, not {len(variations)}; vary one and set the "
-            "others in the scene"
+            f"best values need one or two varied keys, not {len(variations)}; vary these and set "
+            "the others in the scene"
         )
-    (grid,) = variations
-    values = set(grid.values) if isinstance(grid, Choice) else set()
+    grids = [each for each in variations if isinstance(each, Choice) and _is_grid(each)]
+    for each in variations:
+        if each not in grids:
+            raise ValueError(
+                f"a best value of {each.key} needs at least three values, all numbers; give "
+                f"{each.key}=start:stop:n"
+            )
+    return grids
+
+
+def _is_grid(choice: Choice) -> bool:
+    values = set(choice.values)
     numbers = [x for x in values if isinstance(x, int | float) and not isinstance(x, bool)]
-    if not isinstance(grid, Choice) or len(numbers) < max(3, len(values)):
-        raise ValueError(
-            f"a best value of {grid.key} needs at least three values, all numbers; give "
-            f"{grid.key}=start:stop:n"
-        )
-    return grid
+    return len(numbers) >= max(3, len(values))
 
 
 def find_best(
-    sweep: Sweep, grid: Choice, column: str, samples: int | None = None, seed: int = 0
-) -> Best:
-    """Find the best value of a key on a grid that `check` accepts; an interrupted search resumes.
+    sweep: Sweep, grids: Sequence[Choice], column: str, samples: int | None = None, seed: int = 0
+) -> tuple[Best, ...]:
+    """Find the best value of each key on grids that `check` accepts; an interrupted search resumes.
 
     Raises a ValueError if no run has a number in the column, or too few samples have one.
     """
-    n, key, values = samples or SAMPLES, grid.key, grid.values
-    (best,), (result,) = optima(lambda runs: _column(sweep, column, runs), key, values, [{}])
+    n, levels = samples or SAMPLES, {grid.key: grid.values for grid in grids}
+    (values,), (result,) = optima(lambda runs: _column(sweep, column, runs), levels, [{}])
     if not np.isfinite(result):
         raise ValueError(f"column '{column}' has no finite number in this sweep; choose another")
-    found = Best(
-        key=key, column=column, value=float(best), result=float(result),
-        limits=(float(min(values)), float(max(values))),
+    found = tuple(
+        Best(
+            key=key, column=column, value=float(value), result=float(result),
+            limits=(float(min(levels[key])), float(max(levels[key]))),
+        )
+        for key, value in zip(levels, values, strict=True)
     )  # fmt: skip
-    points = [point for point in sweep.points([{key: x} for x in values]) if point.scene]
+    points = [point for point in sweep.points(combinations(grids)) if point.scene]
     scenes = [point.scene for point in points if point.scene]
     models = [model_of(scene, sweep.options) for scene in scenes]
     # If the motion is proportional to the pressure, this does not change the best value.
-    fixed = {key, PRESSURE} if all(map(is_linear, scenes, models)) else {key}
+    fixed = {*levels, *([PRESSURE] if all(map(is_linear, scenes, models)) else [])}
     spreads: list[Spread] = [
         each for each in spreads_of(points[0].before or scenes[0]) if each.key not in fixed
     ]
@@ -139,20 +156,28 @@ def find_best(
         progress=lambda step, part: sweep.progress("samples" if step == "run" else step, part),
     )  # fmt: skip
     settings = combinations(spreads, "lhs", n, seed)
-    bests, results = optima(lambda runs: _column(own, column, runs), key, values, settings)
+    bests, results = optima(lambda runs: _column(own, column, runs), levels, settings)
     bests = bests[np.isfinite(results)]
     if len(bests) < FEWEST_SAMPLES:
         raise ValueError(
             f"only {len(bests)} of {n} samples have a number in column '{column}'; narrow their "
             "distributions or choose another column"
         )
-    low, high = np.percentile(bests, ENDS, method="weibull")
-    margin = ACCURACY * np.diff(np.unique(values)).max()
-    low, high = np.clip((low - margin, high + margin), *found.limits).tolist()
-    uncertain = tuple(each.key for each in spreads)
-    return replace(
-        found, interval=(low, high), samples=len(bests), failed=n - len(bests), uncertain=uncertain
-    )
+    return tuple(
+        replace(
+            best, interval=_interval(drawn, levels[best.key]), samples=len(bests),
+            failed=n - len(bests), uncertain=tuple(each.key for each in spreads),
+            drawn=tuple(drawn.tolist()),
+        )
+        for best, drawn in zip(found, bests.T, strict=True)
+    )  # fmt: skip
+
+
+def _interval(drawn: Floats, grid: Sequence[float]) -> tuple[float, float]:
+    low, high = np.percentile(drawn, ENDS, method="weibull")
+    margin = ACCURACY * np.diff(np.unique(grid)).max()
+    low, high = np.clip((low - margin, high + margin), min(grid), max(grid)).tolist()
+    return low, high
 
 
 def _column(sweep: Sweep, column: str, combined: Combinations) -> Floats:
@@ -172,44 +197,68 @@ def _column(sweep: Sweep, column: str, combined: Combinations) -> Floats:
 
 def optima(
     evaluate: Callable[[Combinations], Floats],
-    key: str,
-    grid: Sequence[float],
+    grids: Mapping[str, Sequence[float]],
     settings: Combinations,
 ) -> tuple[Floats, Floats]:
-    """Return the best values (n,) of a key for settings (n,) of other keys, refined from a grid
-    (g,), and the column there, -inf if a setting has none.
+    """Return the best values (n, d) of d keys for settings (n,) of other keys, refined from grids
+    of all their combinations, and the column (n,) there, -inf if a setting has none.
 
     `evaluate` returns the column (m,) of runs (m,), or nan.
     """
 
     def column_at(values: Floats) -> Floats:
-        """Return the column (n, g) at values (n, g) of the key."""
+        """Return the column (n, g) at values (n, g, d) of the keys."""
         # Runs at one value follow each other, because they share the cached lines of the load.
         runs = [
-            {**own, key: x} for at in values.T.tolist() for own, x in zip(settings, at, strict=True)
+            {**own, **dict(zip(grids, at, strict=True))}
+            for places in values.swapaxes(0, 1).tolist()
+            for own, at in zip(settings, places, strict=True)
         ]
-        column = evaluate(runs).reshape(values.T.shape).T
+        column = evaluate(runs).reshape(values.shape[1], values.shape[0]).T
         return np.where(np.isfinite(column), column, -np.inf)
 
-    x = np.tile(np.unique(grid), (len(settings), 1))
+    levels = [np.unique(grid) for grid in grids.values()]
+    mesh = np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
+    x = np.tile(mesh, (len(settings), 1, 1))
     y = column_at(x)
-    for _ in range(REFINEMENTS):
-        vertices = np.array([[_vertex(*each)] for each in zip(x, y, strict=True)])
+    for _ in range(REFINEMENTS * len(levels)):
+        vertices = np.array([[_vertex(*each, levels)] for each in zip(x, y, strict=True)])
         x, y = np.hstack([x, vertices]), np.hstack([y, column_at(vertices)])
-    best = y.argmax(axis=1)[:, None]
-    return np.take_along_axis(x, best, 1)[:, 0], np.take_along_axis(y, best, 1)[:, 0]
+    best = np.arange(len(x)), y.argmax(axis=1)
+    return x[best], y[best]
 
 
-def _vertex(x: Floats, y: Floats) -> float:
-    """Return the vertex of the parabola through the best point and its neighbours, or the point."""
-    best = float(x[y.argmax()])
-    x, first = np.unique(x[np.isfinite(y)], return_index=True)
-    y = y[np.isfinite(y)][first]
-    if len(x) < 3:
+def _vertex(x: Floats, y: Floats, levels: Sequence[Floats]) -> Floats:
+    """Return the largest value (d,) of a quadratic function near the best of points (m, d).
+
+    The function goes through the best point. Its errors at points up to the neighbouring levels of
+    the grid are least squares, with weights that fall with the fourth power of distance.
+    """
+    best, finite = x[y.argmax()], np.isfinite(y)
+    levels = [each[np.isin(each, own)] for each, own in zip(levels, x[finite].T, strict=True)]
+    if min(map(len, levels)) < 3:
         return best
-    k = min(max(int(y.argmax()), 1), len(x) - 2)
-    (a, b, c), slopes = x[k - 1 : k + 2], np.diff(y[k - 1 : k + 2]) / np.diff(x[k - 1 : k + 2])
-    if not slopes[1] < slopes[0]:
+    # Three neighbouring levels for each key.
+    first = [
+        np.clip(abs(each - at).argmin(), 1, len(each) - 2) - 1
+        for each, at in zip(levels, best, strict=True)
+    ]
+    low, high = np.transpose([each[k : k + 3 : 2] for each, k in zip(levels, first, strict=True)])
+    near, step = finite & ((low <= x) & (x <= high)).all(axis=1), (high - low) / 2
+    away, drop = (x[near] - best) / step, y.max() - y[near]
+    rows, columns = np.triu_indices(len(best))
+    terms = np.hstack([away, away[:, rows] * away[:, columns]])
+    weights = np.maximum(np.linalg.norm(away, axis=1), ACCURACY) ** -4
+    drop = weights * drop / (drop.max() or 1)
+    fitted, _, rank, _ = np.linalg.lstsq(weights[:, None] * terms, drop, rcond=None)
+    if rank < len(fitted):
         return best
-    vertex = (a + b) / 2 + (c - a) / 2 * slopes[0] / (slopes[0] - slopes[1])
-    return float(np.clip(vertex, a, c))
+    slope, curvature = fitted[: len(best)], np.zeros((len(best), len(best)))
+    curvature[rows, columns] = fitted[len(best) :]
+    curvature += curvature.T
+    lowest = minimize(
+        lambda z: (slope @ z + z @ curvature @ z / 2, slope + curvature @ z),
+        np.zeros(len(best)), jac=True, tol=1e-12,
+        bounds=np.transpose([(low - best) / step, (high - best) / step]),
+    )  # fmt: skip
+    return np.clip(best + step * lowest.x, low, high)

@@ -194,6 +194,8 @@ def best_value(
 ) -> best.Best:
     """Find the value of one key at which a column of the sweep's table is largest.
 
+    `best_values` finds those of two keys together.
+
     Parameters
     ----------
     scene : Scene
@@ -222,9 +224,27 @@ def best_value(
     >>> best.value, best.is_at_end
     (50.0, True)
     """
-    grid = best.check([_variation(key, values) for key, values in vary.items()], samples)
+    if len(vary) != 1:
+        raise ValueError(f"best_value takes one key, not {len(vary)}; for two, use best_values")
+    return best_values(scene, vary, column, samples=samples, seed=seed, **options)[0]
+
+
+def best_values(
+    scene: Scene,
+    vary: Mapping[str, Values],
+    column: str,
+    *,
+    samples: int | None = None,
+    seed: int = 0,
+    **options: Any,
+) -> tuple[best.Best, ...]:
+    """Find the values of one or two keys at which a column is largest, as in `best_value`.
+
+    Returns a Best for each key, with the values of the samples in the same order.
+    """
+    grids = best.check([_variation(key, values) for key, values in vary.items()], samples)
     with _sweep_of(scene, **options) as made:
-        return best.find_best(made, grid, column, samples, seed)
+        return best.find_best(made, grids, column, samples, seed)
 
 
 @contextmanager

@@ -1,7 +1,9 @@
 """Figures of a sweep: a column over one or two varied keys (matplotlib)."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -16,6 +18,9 @@ from simple_model.threshold import BAND
 from skinwave.report.column_labels import at_probe, axis_label, column_unit
 from skinwave.report.styles import Style
 from skinwave.sweeps.dataset import Row
+
+if TYPE_CHECKING:
+    from skinwave.sweeps.best import Best
 
 SPEED = "tacton.speed_m_per_s"
 MARKERS = "osD^vP*X"
@@ -102,6 +107,37 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
             axis.set_ticks(np.arange(0, len(levels), step) + 0.5, names)
         ax.set(xlabel=axis_label(x), ylabel=axis_label(y))
         figure.colorbar(image, ax=ax, label=axis_label(column))
+    return figure
+
+
+def best_figure(rows: Sequence[Row], bests: Sequence[Best], style: Style) -> Figure:
+    """Draw the column of a search over its one or two keys, with the best values, their intervals
+    and, over two keys, the best values of the samples as dots.
+
+    Raises a ValueError if the column has no numbers.
+    """
+    column, keys = bests[0].column, [best.key for best in bests]
+    names, at = [*keys, column][:2], [*(best.value for best in bests), bests[0].result][:2]
+    _check(rows, (column, *keys))
+    with mpl.rc_context(style.rc):
+        figure = Figure(figsize=style.size(6.4, 4.6), layout="constrained")
+        ax = figure.subplots()
+        if len(keys) == 1:
+            curves(ax, rows, column, keys[0], None)
+        else:
+            cells = np.array([[value(row, name) for name in (*keys, column)] for row in rows])
+            x, y, z = cells[np.isfinite(cells).all(axis=1)].T
+            levels = ax.tricontourf(x, y, z, levels=20, cmap="viridis")
+            figure.colorbar(levels, ax=ax, label=axis_label(column))
+            ax.plot(*(best.drawn for best in bests), "w.", ms=3, alpha=0.6)
+        for k, best in enumerate(bests):
+            if best.interval:
+                ends = np.array([at, at])
+                ends[:, k] = best.interval
+                ax.plot(*ends.T, "r.-", lw=1)
+        ax.plot(*at, "r*", ms=9, label="best" + ", 95 % interval" * bool(bests[0].interval))
+        ax.legend(fontsize=small())
+        ax.set(xlabel=axis_label(names[0]), ylabel=axis_label(names[1]))
     return figure
 
 
