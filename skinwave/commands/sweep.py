@@ -70,6 +70,10 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="write columns with one value in all rows, too, which are otherwise in the metadata",
     )  # fmt: skip
     add(
+        "--waveforms", action="store_true",
+        help="also write the waveforms at all probes into waveforms/rows, a list for each run",
+    )  # fmt: skip
+    add(
         "--plot", nargs="*", metavar="COLUMN",
         help="draw columns of the table into the folder figures: peak_um (default), level_db, "
         "f_AM_um[2] for one probe",
@@ -150,6 +154,7 @@ def _sweep(
             folder=out, points=partial(cases, options.scene), options=solving, progress=progress,
             scheduler=options.scheduler, workers=options.workers,
             command=record.command_entry(options), all_columns=options.all_columns,
+            waveforms=options.waveforms,
         )  # fmt: skip
         outcome = sweep.run(points)
         if outcome.planned > outcome.missing:

@@ -104,20 +104,15 @@ def check(variations: Sequence[Variation], samples: int | None = None) -> list[C
             f"best values need one or two varied keys, not {len(variations)}; vary these and set "
             "the others in the scene"
         )
-    grids = [each for each in variations if isinstance(each, Choice) and _is_grid(each)]
     for each in variations:
-        if each not in grids:
+        values = set(each.values) if isinstance(each, Choice) else set()
+        numbers = [x for x in values if isinstance(x, int | float) and not isinstance(x, bool)]
+        if len(numbers) < max(3, len(values)):
             raise ValueError(
                 f"a best value of {each.key} needs at least three values, all numbers; give "
                 f"{each.key}=start:stop:n"
             )
-    return grids
-
-
-def _is_grid(choice: Choice) -> bool:
-    values = set(choice.values)
-    numbers = [x for x in values if isinstance(x, int | float) and not isinstance(x, bool)]
-    return len(numbers) >= max(3, len(values))
+    return [each for each in variations if isinstance(each, Choice)]
 
 
 def find_best(
@@ -151,7 +146,7 @@ def find_best(
     # Samples use the steady state in place of the wavenumber integral from rest.
     steady = {*models} == {FLAT_BODY.name} and all(takes(HARMONIC, scene) for scene in scenes)
     own = replace(
-        sweep, folder=sweep.folder / FOLDER, assessed=False,
+        sweep, folder=sweep.folder / FOLDER, assessed=False, waveforms=False,
         options=replace(sweep.options, model=HARMONIC.name) if steady else sweep.options,
         progress=lambda step, part: sweep.progress("samples" if step == "run" else step, part),
     )  # fmt: skip
@@ -163,21 +158,19 @@ def find_best(
             f"only {len(bests)} of {n} samples have a number in column '{column}'; narrow their "
             "distributions or choose another column"
         )
+    ends = np.percentile(bests, ENDS, axis=0, method="weibull").T
+    intervals = [  # with the accuracy of a best value
+        np.clip(each + [-margin, margin], *best.limits).tolist()
+        for best, each in zip(found, ends, strict=True)
+        for margin in [ACCURACY * np.diff(np.unique(levels[best.key])).max()]
+    ]
     return tuple(
         replace(
-            best, interval=_interval(drawn, levels[best.key]), samples=len(bests),
-            failed=n - len(bests), uncertain=tuple(each.key for each in spreads),
-            drawn=tuple(drawn.tolist()),
+            best, interval=(low, high), samples=len(bests), failed=n - len(bests),
+            uncertain=tuple(each.key for each in spreads), drawn=tuple(drawn.tolist()),
         )
-        for best, drawn in zip(found, bests.T, strict=True)
+        for best, (low, high), drawn in zip(found, intervals, bests.T, strict=True)
     )  # fmt: skip
-
-
-def _interval(drawn: Floats, grid: Sequence[float]) -> tuple[float, float]:
-    low, high = np.percentile(drawn, ENDS, method="weibull")
-    margin = ACCURACY * np.diff(np.unique(grid)).max()
-    low, high = np.clip((low - margin, high + margin), min(grid), max(grid)).tolist()
-    return low, high
 
 
 def _column(sweep: Sweep, column: str, combined: Combinations) -> Floats:
@@ -238,12 +231,9 @@ def _vertex(x: Floats, y: Floats, levels: Sequence[Floats]) -> Floats:
     levels = [each[np.isin(each, own)] for each, own in zip(levels, x[finite].T, strict=True)]
     if min(map(len, levels)) < 3:
         return best
-    # Three neighbouring levels for each key.
-    first = [
-        np.clip(abs(each - at).argmin(), 1, len(each) - 2) - 1
-        for each, at in zip(levels, best, strict=True)
-    ]
-    low, high = np.transpose([each[k : k + 3 : 2] for each, k in zip(levels, first, strict=True)])
+    pairs = zip(levels, best, strict=True)
+    middle = [np.clip(abs(each - at).argmin(), 1, len(each) - 2) for each, at in pairs]
+    low, high = np.transpose([each[[k - 1, k + 1]] for each, k in zip(levels, middle, strict=True)])
     near, step = finite & ((low <= x) & (x <= high)).all(axis=1), (high - low) / 2
     away, drop = (x[near] - best) / step, y.max() - y[near]
     rows, columns = np.triu_indices(len(best))

@@ -23,14 +23,16 @@ from skinwave.results import outputs, record
 from skinwave.results.outputs import output_file
 from skinwave.system.plain_text import csv_table
 
-# In the folder of a sweep: those of the table and of pieces, and the table as CSV.
-ROWS, PIECES, CSV = "rows", "pieces", "rows.csv"
+# In the folder of a sweep: those of the table and of pieces, the folder of waveforms, with the same
+# two, and the table as CSV.
+ROWS, PIECES, WAVEFORMS, CSV = "rows", "pieces", "waveforms", "rows.csv"
 LOCK = ".lock"  # file in the folder of rows
 FROM_PYTHON = {"typed": "", "name": "sweep", "options": {}}  # command of a sweep in Python
 LARGEST_FILE = 500_000_000  # bytes
 MOST_ROWS = 1_000_000  # of one file
 KEY, INDEX = "key", "index"  # columns: a row's name, and its place in the design
-OUTCOME = (INDEX, KEY, "status", "error")  # columns that files have even if all rows are alike
+OUTCOME = (INDEX, KEY, "status", "error")
+WAVEFORM = "waveform_"  # start of a column; files have these and those above even if all are alike
 CONSTANTS = b"constants"  # in the metadata of a file: JSON of the other columns with one value
 
 Row = Mapping[str, Any]
@@ -95,11 +97,12 @@ def append(out: Path, rows: Sequence[Row]) -> None:
     cells = {name: [row.get(name) for row in rows] for name in names}
     same = {
         name: column[0] for name, column in cells.items()
-        if name not in OUTCOME and all(cell == column[0] for cell in column)
+        if name not in OUTCOME and not name.startswith(WAVEFORM)
+        and all(cell == column[0] for cell in column)
     }  # fmt: skip
     table = pa.table({name: column for name, column in cells.items() if name not in same})
     table = table.replace_schema_metadata({CONSTANTS: json.dumps(same, default=float)})
-    (out / PIECES).mkdir(exist_ok=True)
+    (out / PIECES).mkdir(parents=True, exist_ok=True)
     name = f"piece-{rows[0][KEY]}-{secrets.token_hex(4)}.parquet"
     with _complete_file(out / PIECES / name) as file:
         pq.write_table(table, file, compression="zstd")
@@ -124,6 +127,7 @@ def merge(out: Path, *, all_columns: bool = False, most_bytes: int = 64_000_000)
     add rows; each file has its earlier rows at any time.
     """
     files, pieces = _files(out)
+    (out / ROWS).mkdir(exist_ok=True)
     with _readable(out):
         schema = _common_schema([*files, *pieces], all_columns)
         known = {row[KEY] for row in _rows(files, (KEY,))}
@@ -192,7 +196,8 @@ def _common_schema(paths: Sequence[Path], all_columns: bool) -> Any:
     schema = pa.unify_schemas(schemas, promote_options="permissive")
     constants = {
         name: values[0].get(name) for name in schema.names
-        if name not in OUTCOME and all(each.get(name) == values[0].get(name) for each in values)
+        if name not in OUTCOME and not name.startswith(WAVEFORM)
+        and all(each.get(name) == values[0].get(name) for each in values)
     }  # fmt: skip
     kept = [field for field in schema if all_columns or field.name not in constants]
     return pa.schema(kept, {CONSTANTS: json.dumps(constants).encode()})
@@ -226,13 +231,24 @@ def read(out: Path, columns: Sequence[str] = ()) -> list[dict[str, Any]]:
 
     Raises a ValueError if there are none.
     """
-    with _readable(out):
-        rows = {row[KEY]: row for row in _rows(chain(*_files(out)), columns)}
+    rows = _by_key(out, columns)
     if not rows:
         raise ValueError(f"{out} contains no rows of a sweep; name the folder of a sweep")
     every = columns or dict.fromkeys(chain((INDEX, KEY), *rows.values()))
     ordered = sorted(rows.values(), key=lambda row: row[INDEX])
     return [{name: row.get(name) for name in every} for row in ordered]
+
+
+def _by_key(out: Path, columns: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return the rows of a folder by key, also while a sweep in another process merges them."""
+    files = _files(out)
+    try:
+        with _readable(out):
+            return {row[KEY]: row for row in _rows(chain(*files), columns)}
+    except ValueError:
+        if all(map(os.path.lexists, chain(*files))):
+            raise
+    return _by_key(out, columns)  # a piece was removed, after its rows were in the table
 
 
 def _rows(paths: Iterable[Path], columns: Sequence[str]) -> Iterator[dict[str, Any]]:
@@ -252,8 +268,7 @@ def failures_of(rows: Iterable[Row]) -> dict[str, str]:
 
 def names(out: Path) -> dict[str, int]:
     """Return the index of each row by its name."""
-    with _readable(out):
-        return {row[KEY]: row[INDEX] for row in _rows(chain(*_files(out)), (KEY, INDEX))}
+    return {key: row[INDEX] for key, row in _by_key(out, (KEY, INDEX)).items()}
 
 
 def number_rows(wanted: Iterable[str], earlier: Mapping[str, int]) -> dict[str, int]:
@@ -267,8 +282,9 @@ def number_rows(wanted: Iterable[str], earlier: Mapping[str, int]) -> dict[str, 
 
 def _files(out: Path) -> tuple[list[Path], list[Path]]:
     """Return the files of the table, and the pieces that are not yet in it."""
-    pieces = (out / PIECES).glob("piece-*.parquet")
-    return sorted((out / ROWS).glob("part-*.parquet")), sorted(pieces)
+    # Pieces first: those that a merge removes after this are in the table.
+    pieces = sorted((out / PIECES).glob("piece-*.parquet"))
+    return sorted((out / ROWS).glob("part-*.parquet")), pieces
 
 
 @contextmanager

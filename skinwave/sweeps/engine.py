@@ -4,6 +4,7 @@ Items are handed out in pieces of about equal time, a few for each worker. This 
 nothing that loads numpy, because a worker process sets its threads first.
 """
 
+import sys
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -23,6 +24,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from skinwave.system.effort import usable_cores
+from skinwave.system.plain_text import say
 from skinwave.system.processes import pool
 
 LOCAL = ("processes", "threads")
@@ -54,6 +56,9 @@ def worker_count(scheduler: str, workers: int | None = None) -> int:
     if scheduler in LOCAL:
         return workers or usable_cores()
     with _client(scheduler) as client:
+        if not client.nthreads():
+            say(f"skinwave: the Dask scheduler at {scheduler} has no workers; runs wait until one "
+                f"starts, as by dask worker {scheduler}", sys.stderr)  # fmt: skip
         return _threads(client, set())
 
 

@@ -144,8 +144,8 @@ def sweep(
         model, tolerance, h and solver of every run, as in `skinwave.simulate`; `folder`, which
         stores the rows, so that an interrupted sweep resumes; `scheduler`, "threads", "processes"
         (a script needs a main guard), or the address of a Dask scheduler; `workers`, the number of
-        runs at a time on this machine; `progress`, True for a bar, or a function of the name of the
-        phase and the fraction done.
+        runs at a time on this machine; `waveforms`, True to write these, too; `progress`, True for
+        a bar, or a function of the name of the phase and the fraction done.
 
     Returns
     -------
@@ -238,10 +238,7 @@ def best_values(
     seed: int = 0,
     **options: Any,
 ) -> tuple[best.Best, ...]:
-    """Find the values of one or two keys at which a column is largest, as in `best_value`.
-
-    Returns a Best for each key, with the values of the samples in the same order.
-    """
+    """Return the Best of one or of two keys together; see `best_value`."""
     grids = best.check([_variation(key, values) for key, values in vary.items()], samples)
     with _sweep_of(scene, **options) as made:
         return best.find_best(made, grids, column, samples, seed)
@@ -258,6 +255,7 @@ def _sweep_of(
     folder: str | Path | None = None,
     scheduler: str = "threads",
     workers: int | None = None,
+    waveforms: bool = False,
     progress: Progress | bool | None = None,
 ) -> Iterator[Sweep]:
     """Yield the sweep of some options; without a folder, a temporary one."""
@@ -267,7 +265,7 @@ def _sweep_of(
         yield Sweep(
             folder=Path(temporary) / "sweep" if folder is None else Path(folder),
             points=partial(cases_of, table, table), options=options, progress=report,
-            scheduler=scheduler, workers=workers,
+            scheduler=scheduler, workers=workers, waveforms=waveforms,
         )  # fmt: skip
 
 

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from simple_model import Effort, Response, named_lines, point_kernel
+from simple_model.load.sampling import step
 from simple_model.quantities import DISPLACEMENT, Quantity
 from skinwave.models.options import sample_times
 from skinwave.results.comparison import compare, spread, steady_rms
 from skinwave.results.run import ASSESSED, SUPPORT, Run
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
+from skinwave.sweeps import dataset
 from skinwave.system import extensions
 from skinwave.system.extensions import Registry
 from skinwave.system.failures import reason
@@ -126,6 +128,14 @@ def _own_value(column: Column, run: Run) -> Any:
     if value.shape != shape:
         raise ValueError(f"its function returns the shape {value.shape}; return {shape}")
     return value.tolist()
+
+
+def waveform_columns(response: Response) -> dict[str, Any]:
+    """Return the waveform at each probe in single precision, the first time and the step in s."""
+    record, times = response.record, response.times
+    waveforms = list((record.per_unit * response.values.T).astype(np.float32))
+    first = {"first_s": float(times[0]), "step_s": step(times)}
+    return first | {f"{dataset.WAVEFORM}{record.column}": waveforms}
 
 
 def plain(row: dict[str, Any]) -> dict[str, Any]:

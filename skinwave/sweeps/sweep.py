@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -17,7 +17,7 @@ from skinwave.planning.simulate import compute, solve
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.sweeps import dataset, engine
-from skinwave.sweeps.measures import input_columns, result_columns
+from skinwave.sweeps.measures import input_columns, result_columns, waveform_columns
 from skinwave.sweeps.reductions import (
     Mesh,
     model_of,
@@ -62,6 +62,7 @@ class Sweep:
     workers : number of runs at a time on this machine; all cores by default
     command : `record.command_entry` for the record.json of a new folder
     all_columns : whether files also have the columns with one value in all rows
+    waveforms : whether to write the waveforms, too, into a dataset of the folder
     """
 
     folder: Path
@@ -73,6 +74,7 @@ class Sweep:
     workers: int | None = None
     command: Mapping[str, Any] | None = None
     all_columns: bool = False
+    waveforms: bool = False
 
     def run(self, points: Sequence[DesignPoint]) -> SweepOutcome:
         """Run every point without a row in the folder, and append its row.
@@ -85,7 +87,8 @@ class Sweep:
         wanted = {self._name(point): point for point in points}
         with dataset.lock_rows(dataset.open_folder(self.folder, self.command)):
             outcome = self._run_missing(wanted, count)
-            dataset.merge(self.folder, all_columns=self.all_columns)
+            for folder in (self.folder, *[self.folder / dataset.WAVEFORMS] * self.waveforms):
+                dataset.merge(folder, all_columns=self.all_columns)
         return outcome
 
     def rows(self, points: Sequence[DesignPoint], columns: Sequence[str] = ()) -> list[dataset.Row]:
@@ -103,8 +106,10 @@ class Sweep:
 
     def _run_missing(self, wanted: Mapping[str, DesignPoint], count: int) -> SweepOutcome:
         started, earlier = time.perf_counter(), dataset.names(self.folder)
-        missing = {name: point for name, point in wanted.items() if name not in earlier}
-        index = dataset.number_rows(wanted, earlier)
+        index = dataset.number_rows(wanted, earlier) | earlier
+        waveforms = self.folder / dataset.WAVEFORMS
+        complete = earlier.keys() & dataset.names(waveforms) if self.waveforms else earlier
+        missing = {name: point for name, point in wanted.items() if name not in complete}
         tally = {"done": 0, "failed": 0}
         constant = {
             "version": version("skinwave"), "asked_model": self.options.model,
@@ -113,9 +118,14 @@ class Sweep:
         }  # fmt: skip
 
         def write(rows: Iterable[dict[str, Any]]) -> None:
-            numbered: list[dataset.Row] = [
-                {"index": index[row["key"]]} | constant | row for row in rows
-            ]
+            numbered = list[dict[str, Any]]()
+            waves = list[dict[str, Any]]()
+            for row in rows:
+                place = {"index": index[row["key"]], "key": row["key"]}
+                waves.append(place | row.pop("waveforms", {}))
+                numbered.append(place | constant | row)
+            if numbered and self.waveforms:  # first: a run with a row has its waveforms, too
+                dataset.append(waveforms, waves)
             if numbered:
                 dataset.append(self.folder, numbered)
             for row in numbered:
@@ -128,13 +138,10 @@ class Sweep:
         interrupted = False
         try:
             runs = {name: point for name, point in missing.items() if point.scene}
-            write([
-                {"key": name} | input_columns(point)
-                for name, point in missing.items() if name not in runs
-            ])  # fmt: skip
+            write({"key": n} | input_columns(missing[n]) for n in missing if n not in runs)
             meshes = shared_meshes(runs, self.options, count, distribute, self.progress)
             write([])
-            work = partial(_row, self.options, self.assessed)
+            work = partial(_row, self.options, self.assessed, self.waveforms)
             items = [(name, runs[name], mesh) for name, mesh in meshes.items()]
             distribute(work, items, lambda rows: write(rows.values()))
         except KeyboardInterrupt:
@@ -146,9 +153,12 @@ class Sweep:
 
 
 def _row(
-    options: SolveOptions, assessed: bool, item: tuple[str, DesignPoint, Mesh | None]
+    options: SolveOptions,
+    assessed: bool,
+    waveforms: bool,
+    item: tuple[str, DesignPoint, Mesh | None],
 ) -> dict[str, Any]:
-    """Return the row of one run, on a worker."""
+    """Return the row of one run, on a worker, with a row of `waveforms` if they are written."""
     name, point, mesh = item
     row, started = {"key": name} | input_columns(point), time.perf_counter()
     assert point.scene
@@ -161,6 +171,8 @@ def _row(
             row["reduced_together"] = mesh.family.members if mesh.family else 1
         row |= response.effort.errors.columns()
         row |= result_columns(point.scene, response)
+        if waveforms:
+            row["waveforms"] = waveform_columns(response)
     except Exception as error:  # of any kind: the other runs continue
         row["error"] = reason(error)
     return row | {"seconds": time.perf_counter() - started}
@@ -170,8 +182,5 @@ def _alone(scene: Scene, options: SolveOptions, assessed: bool) -> Response:
     """Return the response of a run without a shared reduction."""
     model = model_of(scene, options)
     if assessed or named(model).default_size is not None:
-        own = SolveOptions(
-            model=model, tolerance=options.tolerance, h=options.h, solver=options.solver
-        )
-        return solve(scene, plan(scene, own))
+        return solve(scene, plan(scene, replace(options, model=model)))
     return compute(scene, model, tolerance=options.tolerance)

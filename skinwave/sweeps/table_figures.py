@@ -113,12 +113,9 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
 def best_figure(rows: Sequence[Row], bests: Sequence[Best], style: Style) -> Figure:
     """Draw the column of a search over its one or two keys, with the best values, their intervals
     and, over two keys, the best values of the samples as dots.
-
-    Raises a ValueError if the column has no numbers.
     """
     column, keys = bests[0].column, [best.key for best in bests]
     names, at = [*keys, column][:2], [*(best.value for best in bests), bests[0].result][:2]
-    _check(rows, (column, *keys))
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(6.4, 4.6), layout="constrained")
         ax = figure.subplots()
@@ -131,10 +128,9 @@ def best_figure(rows: Sequence[Row], bests: Sequence[Best], style: Style) -> Fig
             figure.colorbar(levels, ax=ax, label=axis_label(column))
             ax.plot(*(best.drawn for best in bests), "w.", ms=3, alpha=0.6)
         for k, best in enumerate(bests):
-            if best.interval:
-                ends = np.array([at, at])
-                ends[:, k] = best.interval
-                ax.plot(*ends.T, "r.-", lw=1)
+            ends = np.array([at, at])
+            ends[:, k] = best.interval or best.value
+            ax.plot(*ends.T, "r.-", lw=1)
         ax.plot(*at, "r*", ms=9, label="best" + ", 95 % interval" * bool(bests[0].interval))
         ax.legend(fontsize=small())
         ax.set(xlabel=axis_label(names[0]), ylabel=axis_label(names[1]))

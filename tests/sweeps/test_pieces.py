@@ -13,6 +13,7 @@ from importlib import import_module
 from itertools import count
 from pathlib import Path
 
+import numpy as np
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
@@ -233,3 +234,49 @@ def test_constant_columns_are_in_the_metadata_unless_asked_for(scene):
     assert dataset.read(OUT) == rows
     assert swept(*SEVEN) == 0
     assert ds.dataset(OUT / "rows").to_table().num_columns == table.num_columns
+
+
+def test_waveforms_are_those_of_each_run_also_if_asked_for_later(scene):
+    words = ["--vary", "tacton.size_mm=10,20,70", "--model", "point-kernel", "--out", str(OUT)]
+    assert swept(*words) == 1  # 70 mm fails
+    before = dataset.read(OUT)
+    for _ in range(2):
+        assert swept(*words, "--waveforms") == 1
+        table = ds.dataset(OUT / "waveforms" / "rows").to_table()
+        assert json.loads(table.schema.metadata[b"constants"]).keys() == set()
+        waves = {row["key"]: row for row in table.to_pylist()}
+        assert table.num_rows == len(waves) == 3
+    assert [row["key"] for row in dataset.read(OUT)] == [row["key"] for row in before]
+    for row in before[:2]:
+        with pytest.warns(skinwave.SkinwaveWarning):
+            response = skinwave.simulate(skinwave.loads(row["scene"]), model="point-kernel")
+        wave, scale = waves[row["key"]], response.record.per_unit
+        np.testing.assert_allclose(
+            np.transpose(wave["waveform_pressure_pa"]),
+            scale * response.values,
+            rtol=1e-6,
+            atol=1e-6,
+        )
+        times = wave["first_s"] + wave["step_s"] * np.arange(len(response.times))
+        np.testing.assert_allclose(times, response.times, atol=1e-12)
+    assert waves[before[2]["key"]]["waveform_pressure_pa"] is None
+
+
+@pytest.mark.parametrize("step", ["listing", "reading"])
+def test_rows_are_read_once_while_another_process_merges_them(tmp_path, monkeypatch, step):
+    folder, merged = dataset.open_folder(tmp_path / "sweep"), []
+    for k in range(0, 6, 2):
+        dataset.append(folder, rows_of(range(k, k + 2)))
+    where, name = (Path, "glob") if step == "listing" else (dataset, "_open")
+    inner = getattr(where, name)
+
+    def merging(*given):
+        found = list(inner(*given)) if step == "listing" else inner(*given)
+        if not merged:
+            merged.append(given)
+            dataset.merge(folder)
+        return found
+
+    monkeypatch.setattr(where, name, merging)
+    assert dataset.read(folder) == rows_of(range(6))
+    assert merged
