@@ -1,10 +1,9 @@
 """Best values of one or two varied keys: where a column of the sweep's table is largest, with
 intervals under the spreads of the scene.
 
-The best point of a grid and its neighbours define a quadratic function, and a run at its maximum
-refines the best values. Each sample of the spreads has best values of its own, computed in the same
-way. An interval contains 95 % of those of a key, extended at each end by their accuracy, a tenth of
-a grid step.
+The best point of a grid and its neighbours define a quadratic function; a run at its maximum is
+better. Each sample of the spreads has best values of its own, found in the same way. An
+interval contains 95 % of those of a key, extended at each end by their accuracy, a tenth of a step.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -23,8 +23,7 @@ from skinwave.results import outputs, record
 from skinwave.results.outputs import output_file
 from skinwave.system.plain_text import csv_table
 
-# In the folder of a sweep: those of the table and of pieces, the folder of waveforms, with the same
-# two, and the table as CSV.
+# In the folder of a sweep: those of the table, of pieces, and of waveforms with these two; the CSV.
 ROWS, PIECES, WAVEFORMS, CSV = "rows", "pieces", "waveforms", "rows.csv"
 LOCK = ".lock"  # file in the folder of rows
 FROM_PYTHON = {"typed": "", "name": "sweep", "options": {}}  # command of a sweep in Python

@@ -192,9 +192,7 @@ def best_value(
     seed: int = 0,
     **options: Any,
 ) -> best.Best:
-    """Find the value of one key at which a column of the sweep's table is largest.
-
-    `best_values` finds those of two keys together.
+    """Find the value of a key (`best_values`: of two) at which a column of the table is largest.
 
     Parameters
     ----------

@@ -28,6 +28,7 @@ from skinwave.system.effort import Progress, silent
 from skinwave.system.failures import reason
 
 Combinations = Sequence[Mapping[str, Any]]  # values by key, for each run
+Item = tuple[str, DesignPoint, Mesh | None]  # a run by its name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,8 +119,7 @@ class Sweep:
         }  # fmt: skip
 
         def write(rows: Iterable[dict[str, Any]]) -> None:
-            numbered = list[dict[str, Any]]()
-            waves = list[dict[str, Any]]()
+            numbered, waves = list[dict[str, Any]](), list[dict[str, Any]]()
             for row in rows:
                 place = {"index": index[row["key"]], "key": row["key"]}
                 waves.append(place | row.pop("waveforms", {}))
@@ -152,12 +152,7 @@ class Sweep:
         )  # fmt: skip
 
 
-def _row(
-    options: SolveOptions,
-    assessed: bool,
-    waveforms: bool,
-    item: tuple[str, DesignPoint, Mesh | None],
-) -> dict[str, Any]:
+def _row(options: SolveOptions, assessed: bool, waveforms: bool, item: Item) -> dict[str, Any]:
     """Return the row of one run, on a worker, with a row of `waveforms` if they are written."""
     name, point, mesh = item
     row, started = {"key": name} | input_columns(point), time.perf_counter()
