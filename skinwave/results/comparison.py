@@ -36,6 +36,7 @@ class Agreement:
     phase_delay : (f, p) float, s, positive if the line is later in the candidate; at the probe
         where the line is strongest between -1/4 and 3/4 of a period, unwrapped outwards from there,
         and nan where either line is 20 dB below its largest
+    rms_reference, rms_candidate : (p,) float, `steady_rms`, in the unit of each response
     spread_reference, spread_candidate : {-6: float, -20: float}, m, distance from the strongest
         probe to the outermost one whose steady RMS motion is within 6 or 20 dB
     frequencies : (f,) float, Hz
@@ -59,6 +60,8 @@ class Agreement:
     delay: Floats
     line_ratios: Floats
     phase_delay: Floats
+    rms_reference: Floats
+    rms_candidate: Floats
     spread_reference: dict[int, float]
     spread_candidate: dict[int, float]
     frequencies: Floats
@@ -116,11 +119,14 @@ def compare(
     a, b = (line_phasors(response, frequencies) for response in (reference, candidate))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = abs(scale) * np.abs(b) / np.abs(a)
+    own = [steady_rms(response) for response in (reference, candidate)]
     return Agreement(
         relative_l2=np.linalg.norm(scale * y - x, axis=0) / np.where(norm > 0, norm, 1),
         scale=scale, shape_misfit=shape_misfit, delay=delay, line_ratios=ratios,
         phase_delay=phase_delays(a, b, np.array(frequencies), reference.probes),
-        spread_reference=spread(reference), spread_candidate=spread(candidate),
+        rms_reference=own[0], rms_candidate=own[1],
+        spread_reference=spread(reference.probes, own[0]),
+        spread_candidate=spread(reference.probes, own[1]),
         frequencies=np.array(frequencies, np.float64), probes=reference.probes,
     )  # fmt: skip
 
@@ -201,13 +207,12 @@ def _moving(response: Response) -> Floats:
     return np.asarray(steady - steady.mean(axis=0))
 
 
-def spread(response: Response, other_lines: Sequence[float] = ()) -> dict[int, float]:
-    """Return the distance in m from the strongest probe to the outermost within 6 and 20 dB of its
-    `steady_rms`.
+def spread(probes: Floats, level: Floats) -> dict[int, float]:
+    """Return the distance in m from the strongest of probes (p, 2) to the outermost within 6 and
+    20 dB of its `level` (p,), such as `steady_rms`.
     """
-    level = steady_rms(response, other_lines)
     strongest = int(np.argmax(level))
-    distance = np.linalg.norm(response.probes - response.probes[strongest], axis=1)
+    distance = np.linalg.norm(probes - probes[strongest], axis=1)
     within = {drop: level >= level[strongest] * 10 ** (drop / 20) for drop in (-6, -20)}
     return {drop: float(distance[mask].max()) for drop, mask in within.items()}
 

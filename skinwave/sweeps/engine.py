@@ -57,8 +57,7 @@ def worker_count(scheduler: str, workers: int | None = None) -> int:
         return workers or usable_cores()
     with _client(scheduler) as client:
         if not client.nthreads():
-            say(f"skinwave: the Dask scheduler at {scheduler} has no workers; runs wait until one "
-                f"starts, as by dask worker {scheduler}", sys.stderr)  # fmt: skip
+            say(f"skinwave: {scheduler} has no workers; start dask worker {scheduler}", sys.stderr)
         return _threads(client, set())
 
 

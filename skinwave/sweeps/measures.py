@@ -81,10 +81,11 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
     agreement, scale = compare(kernel, response), response.record.per_unit
     unit = unit_of(response.record)
     support = [run.line_hz[SUPPORT]] if SUPPORT in run.line_hz else []
-    within = spread(response, support)
+    level = steady_rms(response, support) if support else agreement.rms_candidate
+    within = spread(response.probes, level)
     row: dict[str, Any] = {
         "status": "done", "model": response.model,
-        "kernel_peak_pa": _peak(kernel), "kernel_rms_pa": steady_rms(kernel),
+        "kernel_peak_pa": _peak(kernel), "kernel_rms_pa": agreement.rms_reference,
         "kernel_misfit": agreement.relative_l2, "kernel_shape_misfit": agreement.shape_misfit,
         "kernel_delay_ms": 1e3 * agreement.delay,
         "kernel_spread_6db_mm": 1e3 * agreement.spread_reference[-6],
@@ -93,7 +94,7 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
     if of_body:
         row |= {
             f"peak_{unit}": scale * _peak(response),
-            f"rms_{unit}": scale * steady_rms(response, support),
+            f"rms_{unit}": scale * level,
             "spread_6db_mm": 1e3 * within[-6], "spread_20db_mm": 1e3 * within[-20],
         }  # fmt: skip
     levels = run.levels
