@@ -246,3 +246,13 @@ def test_many_curves_have_a_colour_bar_and_levels_the_threshold():
     legend = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert [words.split()[0] for words in legend] == ["threshold,", "Rayleigh"]
     assert figure.get_figwidth() == 3.5
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_without_workers_is_named(capsys):
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=0, dashboard_address=None) as cluster:
+        assert engine.worker_count(cluster.scheduler_address) == 1
+        assert f"{cluster.scheduler_address} has no workers" in capsys.readouterr().err
