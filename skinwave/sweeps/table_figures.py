@@ -1,9 +1,7 @@
 """Figures of a sweep: a column over one or two varied keys (matplotlib)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -18,9 +16,6 @@ from simple_model.threshold import BAND
 from skinwave.report.column_labels import at_probe, axis_label, column_unit
 from skinwave.report.styles import Style
 from skinwave.sweeps.dataset import Row
-
-if TYPE_CHECKING:
-    from skinwave.sweeps.best import Best
 
 SPEED = "tacton.speed_m_per_s"
 MARKERS = "osD^vP*X"
@@ -110,9 +105,9 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
     return figure
 
 
-def best_figure(rows: Sequence[Row], bests: Sequence[Best], style: Style) -> Figure:
-    """Draw the column of a search over its one or two keys, with the best values, their intervals
-    and, over two keys, the best values of the samples as dots.
+def best_figure(rows: Sequence[Row], bests: Sequence[Any], style: Style) -> Figure:
+    """Draw the column of a search over its one or two keys, with each `Best`, their intervals and,
+    over two keys, the best values of the samples as dots.
     """
     column, keys = bests[0].column, [best.key for best in bests]
     names, at = [*keys, column][:2], [*(best.value for best in bests), bests[0].result][:2]
