@@ -14,7 +14,7 @@ from meshes.records import decode, encode
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import Body
 from skinwave.bodies.build import build, operators
-from skinwave.models import meshed, reduced
+from skinwave.models import meshed, reduced, symmetry
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
 from skinwave.models.symmetry import axes_of_probes
@@ -118,13 +118,14 @@ def test_a_plan_is_the_same_again_with_and_without_a_cache(monkeypatch, tmp_path
     for other in found[1:]:
         assert cache.digest(other.values) == cache.digest(found[0].values)
         assert other.effort.mesh == found[0].effort.mesh
-        assert other.expected_error == found[0].expected_error
+        # Of a coarser mesh as well, whose sums differ by round-off if threads share them otherwise.
+        assert other.expected_error == pytest.approx(found[0].expected_error, rel=1e-9)
 
 
 def motions(monkeypatch, body, probes, h):
     scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=probes), []
     for axes in (axes_of_probes, lambda probes, among: ""):
-        monkeypatch.setattr(meshed, "axes_of_probes", axes)
+        monkeypatch.setattr(symmetry, "axes_of_probes", axes)
         made = reduced.prepare(scene, SolveOptions(h=h), reduction=1e-6)
         found.append(reduced.answer(made, scene))
     return found
@@ -149,7 +150,7 @@ def test_probes_on_a_plane_need_only_the_even_part(monkeypatch, body, probes, h,
 def test_lines_are_solved_on_the_even_part(monkeypatch):
     scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=SLAB, probes=ON_X), []
     for axes in (axes_of_probes, lambda probes, among: ""):
-        monkeypatch.setattr(meshed, "axes_of_probes", axes)
+        monkeypatch.setattr(symmetry, "axes_of_probes", axes)
         found.append(compute(scene, "fem-harmonic", h=0.01))
     part, whole = found
     assert part.effort.dofs < 0.6 * whole.effort.dofs
