@@ -110,10 +110,7 @@ def point_integrals(
     w = np.atleast_1d(np.asarray(frequencies, np.complex128))
     integrals = np.zeros((len(field.orders), len(w), len(r)), np.complex128)
 
-    @lru_cache(maxsize=2)
-    def grid(lift: float, n: int) -> _Grid:
-        return _grid(field.orders, r, width, lift, n)
-
+    grid = partial(_grid, field.orders, tuple(r.tolist()), width)
     n, before = FEWEST_NODES, 0.0
     check_interval = 8  # batches between two checks of the grid
     for part in _batches(w):
@@ -225,8 +222,12 @@ def _integrate(field: Field, w: Complex, grid: _Grid) -> Complex:
     return np.concatenate(parts, axis=1)
 
 
-def _grid(orders: tuple[int, ...], r: Floats, width: float, lift: float, n: int) -> _Grid:
-    """Gauss-Legendre nodes on panels along the raised path."""
+@lru_cache(maxsize=4)
+def _grid(
+    orders: tuple[int, ...], distances: tuple[float, ...], width: float, lift: float, n: int
+) -> _Grid:
+    """Gauss-Legendre nodes on panels along the raised path. Loads of a sweep share them."""
+    r = np.array(distances)
     nodes, weights = np.polynomial.legendre.leggauss(16)
     # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
     edges = 6.5 / width * np.linspace(0, 1, n // 16 + 1) ** 2
