@@ -16,17 +16,24 @@ export function mapsBeside(program, take) {
     worker.postMessage({ values: answer.values, record: isKnown ? null : record });
     sent.set(record.name, record);
   };
+  const compute = (answer) => take(mapsOf(answer), answer);
   try {
     worker = new Worker(URL.createObjectURL(new Blob([program], { type: "text/javascript" })));
-  } catch { return (answer) => take(mapsOf(answer), answer); }
+  } catch { return compute; }
   worker.onmessage = ({ data }) => {
     const [done, waiting] = [now, next];
     [now, next] = [null, null];
     if (waiting) send(waiting);
     take(data, done);
   };
+  worker.onerror = () => {
+    const waiting = next?.answer ?? now;
+    worker = now = next = null;
+    if (waiting) compute(waiting);
+  };
   return (answer, record) => {
-    if (now) next = { answer, record };
+    if (!worker) compute(answer);
+    else if (now) next = { answer, record };
     else send({ answer, record });
   };
 }
