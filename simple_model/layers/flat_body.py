@@ -272,8 +272,8 @@ def field_history(
             blocks = min(len(table), len(table) * padded * parts // AT_ONCE + 1)
             for some in np.array_split(np.arange(len(table)), blocks):
                 x = of_load(weighted[m, c, some].T)
-                transformed = rfft(x, axis=0)[: len(w)] / parts
-                u[:, i, m] += np.einsum("wj,wj->w", g[c][:, some], transformed)
+                transformed = rfft(x, axis=0)[: g.shape[1]] / parts
+                u[: g.shape[1], i, m] += np.einsum("wj,wj->w", g[c][:, some], transformed)
     t = dt * np.arange(n)[::within]
     u *= passed[:, None, None]
     return np.fft.irfft(u, padded, axis=0)[:n:within] * np.exp(damping * t[:, None, None])
@@ -289,12 +289,14 @@ def _transform_frequencies(padded: int, dt: float) -> Complex:
 def _transient(
     field: Field, distances: tuple[float, ...], padded: int, dt: float, width: float
 ) -> Complex:
-    """Integrals (c, f, r) of a transient. They depend on the body, not on the Tacton, so that all
-    loads of a sweep share them.
+    """Integrals (c, f, r) of a transient, up to the last frequency where they are not negligible.
+    They depend on the body, not on the Tacton, so that all loads of a sweep share them.
     """
     w = _transform_frequencies(padded, dt)
     negligible = 1e-4  # of the largest response, where the frequencies of a transient end
     g = point_integrals(field, np.array(distances), w, width, negligible=negligible)
+    used = 1 + int(np.flatnonzero(g.any(axis=(0, 2))).max(initial=0))
+    g = g[:, :used].copy()
     g.flags.writeable = False
     return g
 

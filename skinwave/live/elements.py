@@ -34,7 +34,7 @@ LOWEST = 0.15  # m: lowest height of the focus whose spot the elements resolve
 REACH, SPACING = 0.031, 0.0042
 FREQUENCIES = (20.0, 85.0, 155.0, 230.0, 315.0, 415.0, 540.0)  # Hz
 MOST = 700  # dimensions of the basis
-ERROR = 0.2  # relative, of components up to `BAND` and within 20 dB of the strongest
+ERROR = 0.25  # relative, of components up to `BAND` and within 20 dB of the strongest
 BAND = 300.0  # Hz
 WARNING = (
     f"The error is {100 * ERROR:g} % for components up to {BAND:g} Hz and within 20 dB of the "

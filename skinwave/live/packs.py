@@ -18,7 +18,7 @@ from skinwave.models.plate_modes import MODES
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Progress, silent, versions
 
-FORMAT = "live pack 5"  # of cached entries
+FORMAT = "live pack 6"  # of cached entries
 
 
 def pack_method(body: Body) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from math import inf
 
 from simple_model import ErrorPart
+from simple_model.load.spot_map import SpotMap
 from skinwave.models import Model
 from skinwave.models.laws import own_laws, series_tolerance
 from skinwave.models.limits import takes
@@ -33,10 +34,11 @@ def own_parts(model: Model, scene: Scene, options: SolveOptions = DEFAULT) -> tu
 def left_out_parts(
     scene: Scene, model: Model, tolerance: float, prepared: ReducedBody | None = None
 ) -> Iterator[ErrorPart]:
-    """Yield the parts due to stretching, which a linear model of a sheet leaves out, and to Prony
-    series that replace modulus laws. A `prepared` body on any mesh saves the reduction of a coarse
-    one.
+    """Yield the parts due to stretching, which a linear model of a sheet leaves out, to Prony
+    series that replace modulus laws, and to the focus. A `prepared` body on any mesh saves the
+    reduction of a coarse one.
     """
+    yield from focus_parts(scene)
     if error := stretching_error(scene, model, tolerance):
         has_other = takes(STRETCHED, scene)
         cure = f"use --model {STRETCHED.name}" if has_other else "use a thicker sheet"
@@ -51,6 +53,13 @@ def left_out_parts(
             error=series_error(scene, model.name, tolerance, prepared),
             cure="use --model flat-body-harmonic or fem-harmonic, which take the law itself",
         )
+
+
+def focus_parts(scene: Scene) -> Iterator[ErrorPart]:
+    """Yield the part due to the interpolation of a focus between the samples of its map."""
+    if isinstance(spot := scene.pressure.profile, SpotMap):
+        source, cure = "the map of the focus", "use a map with more samples"
+        yield ErrorPart(name="focus", source=source, error=spot.error, cure=cure)
 
 
 def element_parts(

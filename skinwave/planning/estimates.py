@@ -34,9 +34,8 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
         f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
-        if (
-            gaussian_sum(pressure.height, pressure.profile) is None
-        ):  # a Gaussian of the same width shows which lines matter
+        if gaussian_sum(pressure.height, pressure.profile) is None:
+            # A Gaussian of the same width shows which lines matter.
             pressure = replace(pressure, profile="gaussian")
         try:
             f, a = steady_lines(

@@ -117,7 +117,7 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
         planned = replace(planned, rows=(*planned.rows, *_law_rows(scene, model, tolerance)))
     else:
         planned = Plan(model=model.name, body=scene.body, rows=(request.model_row(),))
-        parts = [the_load]
+        parts = [the_load, *errors.focus_parts(scene)]
     statement = Statement(parts=tuple(parts), tolerance=tolerance)
     planned = _with_cost(planned, scene, model, options)
     rows, cautions = (*planned.rows, _error_row(statement)), implausible(scene)

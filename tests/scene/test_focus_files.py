@@ -147,6 +147,14 @@ def test_every_model_answers_to_the_map_of_a_gaussian_as_to_the_gaussian(model, 
     assert np.abs(a - b).max() < of_map.pressure.profile.error * np.abs(b).max()
 
 
+@pytest.mark.parametrize("body", [MODELS["flat-body"], "kind = 'none'"])
+def test_a_plan_states_the_error_of_a_map(body, tmp_path):
+    WRITERS["rms.csv"](tmp_path / "rms.csv")
+    scene = scene_of(body, MAP, tmp_path)
+    parts = {part.name: part.error for part in plan(scene).statement.parts}
+    assert parts["focus"] == scene.pressure.profile.error > 1e-5
+
+
 @pytest.mark.parametrize("quantity", ["displacement", "displacement_x"])
 @pytest.mark.parametrize("model", ["flat-body", "flat-body-harmonic"])
 def test_wavenumber_integrals_take_spots_without_symmetry(model, quantity):
