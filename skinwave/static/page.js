@@ -98,7 +98,13 @@ function markOld() {
   $("page").classList.toggle("stale", Boolean(editing) || errors.has("load"));
 }
 
-const schedule = () => { curvesDue ||= requestAnimationFrame(showCurves); };
+/** Mark the tiles as busy until they show the numbers of the present values. */
+const showBusy = (isBusy) => $("tiles").setAttribute("aria-busy", isBusy);
+
+function schedule() {
+  showBusy(true);
+  curvesDue ||= requestAnimationFrame(showCurves);
+}
 
 /** Address of this page with its values and view, as far as they differ from the starts. */
 const address = () => addressOf(values, starts, { view: view.look === "maps" ? "" : view.look,
@@ -151,7 +157,10 @@ function showCurves() {
   markOld();
   controls.show(values, drawnAt());
   showMessages();
-  if (errors.has("load")) return;
+  if (errors.has("load")) {
+    showBusy(false);
+    return;
+  }
   const { load } = answer;
   plots.commanded.draw(commandedPlot(answer, spanOf(view.span, load)));
   showPlots();
@@ -182,8 +191,8 @@ function drawnAt() {
 }
 
 /** Take maps and their numbers; those of another body are old. */
-function takeMaps(maps, { body }) {
-  if (body !== answer.body) return;
+function takeMaps(maps, done) {
+  if (done.body !== answer.body) return;
   const keyOf = ({ invalid, peaks = {} }) => [invalid ?? "", ...Object.values(peaks).map(niceTop)].join();
   const before = keyOf(answer);
   Object.assign(answer, maps);
@@ -195,6 +204,7 @@ function takeMaps(maps, { body }) {
   announce();
   if (view.tab === "ab") showPane();
   if (view.look === "3d") showSolid();
+  if (done === answer && !curvesDue) showBusy(false);
 }
 
 const short = (title) => (title.length > 22 ? `${title.slice(0, 21)}…` : title);
