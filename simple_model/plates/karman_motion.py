@@ -110,142 +110,54 @@ def modes_from_rest(
     return ModesFromRest(frequencies=f, forces=forces, motion=motion, poles=free.poles, start=start)
 
 
-def stretched_motion(
-    plate: KarmanPlate, linear: Floats, dt: float, material: Material | None = None
-) -> Floats:
-    """Coordinates (n, r) in kg^1/2 m from rest, at 0, dt, ..., (n - 1) dt in s. Without stretching,
-    the load would move the plate by `linear` (n, r) in kg^1/2 m, the `linear_motion` of the chosen
-    modes.
+def stretched_motion(plate: KarmanPlate, linear: Floats, dt: float, material: Material) -> Floats:
+    """Coordinates (n, r) in kg^1/2 m at 0, dt, ..., (n - 1) dt in s of a plate that starts flat.
+
+    Without stretching they would be `linear` (n, r), such as the `linear_motion` of the chosen
+    modes. Raises an ArithmeticError if a step is not finite.
     """
-    rest = np.zeros((2, linear.shape[1]))
-    return _motion(plate, np.zeros_like(linear[1:]), linear, dt, material, rest)
-
-
-def forced_motion(
-    plate: KarmanPlate,
-    forces: Floats,
-    dt: float,
-    material: Material | None = None,
-    *,
-    start: Floats | None = None,
-) -> Floats:
-    """Coordinates (n + 1, r) in kg^1/2 m at the times 0, dt, ..., n dt under forces (n, r) in N
-    kg^-1/2 on the chosen modes.
-
-    The motion starts from `start` (2, r), coordinates in kg^1/2 m and their rates, or from rest.
-    Without a material it has no loss. Raises an ArithmeticError if a step is not finite.
-    """
-    r = forces.shape[1]
-    start = np.zeros((2, r)) if start is None else start
-    return _motion(plate, forces, np.zeros((len(forces) + 1, r)), dt, material, start)
-
-
-def _motion(
-    plate: KarmanPlate, forces: Floats, linear: Floats, dt: float, material: Material | None,
-    start: Floats,
-) -> Floats:  # fmt: skip
-    """Motion (n + 1, r) that differs from a linear one by the effect of stretching and of forces.
-
-    The linear plate moves exactly: only the difference from it takes the stiffness at rest and the
-    inertia of the steps.
-    """
-    scheme = _Scheme.of(plate, dt, material)
-    M, K, B, rest, pull = scheme.mass, scheme.K, scheme.bending, scheme.rest, scheme.pull
-    keep, follow = scheme.keep[:, None], scheme.follow[:, None]
-    damping, hardening = plate.damping, (rest / 2 + scheme.stiff) / 2
-    system = np.diag(M / dt**2 + damping / dt / 2) + scheme.stiff / 2 * B
+    loss, B = Loss.of(material), plate.bending
+    M, K = _mass_of_steps(plate, loss, dt), np.diag(plate.squared) + (loss.rest - 1) * B
+    # Over a step the stretch of a branch becomes `keep` times itself plus `follow` times the change
+    # of strain.
+    share = (dt / 2 / loss.times)[:, None]
+    keep, follow = (1 - share) / (1 + share), 1 / (1 + share)
+    pull = loss.shares * follow[:, 0]  # stress per stretch at the beginning of a step
+    stiff = loss.lag / dt + pull.sum() / 2  # stress per change of strain over a step
+    system = np.diag(M / dt**2 + plate.damping / dt / 2) + stiff / 2 * B
     inertia = 2 / dt**2 * M
-    after, shift = (
-        np.diag(inertia) - K,
-        np.vstack([linear[1:2] - linear[:1], linear[2:] - linear[:-2]]),
-    )
-    loads = forces + shift @ system
+    after = np.diag(inertia) - K
+    shift = linear[2:] - linear[:-2]
+    loads = shift @ system
+    before = -linear[0]  # round-off and lines that are left out
+    apart = before - dt**2 / 2 * (K @ before) / M
     z = np.empty_like(linear)
-    z[0], rate = start
-    G, before = plate.gradients(z[0]), z[0] - linear[0]
-    y = G @ z[0] / 2
-    unbalanced = forces[0] - K @ before - rest * (y @ G) - scheme.lag * (B @ rate) - damping * rate
-    z[1] = z[0] + shift[0] + dt * rate + dt**2 / 2 * unbalanced / M
-    apart = z[1] - linear[1]
-    bent, stretched = follow * (apart - before) / 2, follow * (G @ z[1] / 2 - y)  # of the branches
-    y = G @ z[1] / 2
-    for n in range(1, len(forces)):
+    z[0], z[1] = 0.0, linear[1] + apart
+    y, bent = np.zeros(len(plate.H)), follow * (apart - before) / 2
+    stretched = np.zeros((len(share), len(y)))
+    for n in range(1, len(z) - 1):
         G = plate.gradients(z[n])
-        rhs = loads[n] + after @ apart - inertia * before
-        rhs -= (rest * y + pull @ stretched) @ G + B @ (pull @ bent)
-        stiffness = dsyrk(hardening, G.T, beta=1.0, c=system, lower=1)
+        rhs = loads[n - 1] + after @ apart - inertia * before
+        rhs -= (loss.rest * y + pull @ stretched) @ G + B @ (pull @ bent)
+        stiffness = dsyrk((loss.rest / 2 + stiff) / 2, G.T, beta=1.0, c=system, lower=1)
         _, change, failed = dposv(stiffness, rhs, lower=1, overwrite_a=1)
         if failed:
             raise ArithmeticError(f"step {n} of dt = {dt:g} s is not finite; lower the load")
         z[n + 1] = z[n - 1] + change
         before, apart = apart, z[n + 1] - linear[n + 1]
         following = G @ z[n + 1] / 2
-        bent = keep * bent + follow * ((change - shift[n]) / 2)
+        bent = keep * bent + follow * ((change - shift[n - 1]) / 2)
         stretched = keep * stretched + follow * (following - y)
         y = following
     return z
 
 
-def energy_between_steps(
-    plate: KarmanPlate, coordinates: Floats, dt: float, material: Material | None = None
-) -> Floats:
-    """Energy (n,) in J between the steps of a motion (n + 1, r) in kg^1/2 m by `forced_motion`."""
-    scheme = _Scheme.of(plate, dt, material)
-    M, K, B, z = scheme.mass, scheme.K, scheme.bending, coordinates
-    keep, follow = scheme.keep[:, None], scheme.follow[:, None]
-    energy, bent, stretched = np.empty(len(z) - 1), np.zeros(1), np.zeros(1)
-    for n in range(len(energy)):
-        G = plate.gradients(z[n])
-        y, before = G @ z[n + 1] / 2, G @ z[max(n - 1, 0)] / 2
-        bent = keep * bent + follow * (z[n + 1] - z[max(n - 1, 0)]) / 2
-        stretched = keep * stretched + follow * (y - before)
-        v = (z[n + 1] - z[n]) / dt
-        springs = scheme.shares @ ((bent @ B * bent).sum(axis=1) + (stretched**2).sum(axis=1))
-        energy[n] = (v @ (M * v) + z[n + 1] @ K @ z[n] + scheme.rest * (y @ y) + springs) / 2
-    return energy
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Scheme:
-    """Coefficients of steps of dt in s: `mass` (r,) of modes, stiffness `K` (r, r) at rest,
-    `bending` (r, r), and the modulus: at `rest`, viscous `lag` in s, and `shares` (j,) of Maxwell
-    branches, whose stretch d becomes `keep` (j,) d + `follow` (j,) times the change of the strain.
+def _mass_of_steps(plate: KarmanPlate, loss: Loss, dt: float, highest_phase: float = 1.2) -> Floats:
+    """Modal masses (r,) that give steps of dt in s the exact frequencies without stretching. Modes
+    of a phase above `highest_phase`, in rad per half step, are slowed down to it.
     """
-
-    dt: float
-    mass: Floats
-    K: Floats
-    bending: Floats
-    rest: float
-    lag: float
-    shares: Floats
-    keep: Floats
-    follow: Floats
-
-    @staticmethod
-    def of(plate: KarmanPlate, dt: float, material: Material | None) -> _Scheme:
-        without_loss = Loss(rest=1.0, lag=0.0, shares=np.zeros(0), times=np.ones(0))
-        loss = Loss.of(material) if material else without_loss
-        squared = np.maximum(plate.squared, 0.0)
-        bending = np.diagonal(plate.bending) * (loss.storage(np.sqrt(squared)) - 1)
-        half = np.sqrt(np.maximum(squared + bending, 0.0)) * dt / 2
-        highest_phase = 1.2  # rad per half step; faster modes are slowed down to it
-        mass = 1 / np.sinc(np.minimum(half, highest_phase) / np.pi) ** 2
-        mass *= np.maximum(half / highest_phase, 1) ** 2
-        share = dt / 2 / loss.times
-        return _Scheme(
-            dt=dt, mass=mass, bending=plate.bending,
-            K=np.diag(plate.squared) + (loss.rest - 1) * plate.bending,
-            rest=loss.rest, lag=loss.lag, shares=loss.shares,
-            keep=(1 - share) / (1 + share), follow=1 / (1 + share),
-        )  # fmt: skip
-
-    @property
-    def pull(self) -> Floats:
-        """Stress (j,) per stretch of branches at the beginning of a step."""
-        return self.shares * self.follow
-
-    @property
-    def stiff(self) -> float:
-        """Stress of viscosity and branches per change of strain over a step."""
-        return self.lag / self.dt + float(self.pull.sum()) / 2
+    squared = np.maximum(plate.squared, 0.0)
+    bending = np.diagonal(plate.bending) * (loss.storage(np.sqrt(squared)) - 1)
+    half = np.sqrt(np.maximum(squared + bending, 0.0)) * dt / 2
+    mass = 1 / np.sinc(np.minimum(half, highest_phase) / np.pi) ** 2
+    return np.asarray(mass * np.maximum(half / highest_phase, 1) ** 2)
