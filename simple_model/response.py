@@ -27,14 +27,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PAGE_SECONDS = 0.030  # s of waveforms on a page, at their end
-# The side lobes of this Kaiser window are below -140 dB, so it resolves lines as weak as that.
-LINE_BETA, LINE_BINS = 19.0, 2.5  # for lines at least this many bins apart
 SETTLE = 0.25  # of a response, left out at its start when lines are fitted
+LINE_BINS = 2.5  # bins between lines that the Kaiser window resolves
 ALIKE = 1e-3  # of the frequency resolution: closer lines are one
 MINOR = 0.05  # of a line: most that unresolved neighbours may have together
-FAINT = 0.02  # of the strongest line: weaker lines may have a larger relative error
-UNEVEN = 1e-6  # of a sampling interval: largest deviation of equal steps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +107,7 @@ class Response:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         quantity(self.quantity)  # refuses an unknown one
-        _check(self.times, self.probes, self.values)
+        _check_shapes(self.times, self.probes, self.values)
 
     @property
     def record(self) -> Quantity:
@@ -120,9 +116,7 @@ class Response:
 
     @property
     def expected_error(self) -> float:
-        """Expected relative error of the worst probe's waveform, from `effort.errors`; inf if
-        unknown.
-        """
+        """Expected relative error of the worst probe's waveform; inf if unknown."""
         return self.effort.errors.error
 
     @property
@@ -222,12 +216,12 @@ class Response:
         return f"<Response of {self.model}: {'; '.join(parts)}>"
 
     def _repr_html_(self) -> str:
-        """A small page: the last waveforms and the spectrum."""
+        """A small page: the waveforms of the last 30 ms and the spectrum."""
 
         def draw(figure: Figure) -> None:
             left, right = figure.subplots(1, 2)
-            end = 1e3 * self.times[-1]
-            self.plot(ax=left).set_xlim(max(1e3 * self.times[0], end - 1e3 * PAGE_SECONDS), end)
+            start, end = 1e3 * self.times[[0, -1]]
+            self.plot(ax=left).set_xlim(max(start, end - 30), end)
             self.spectrum().plot(ax=right)
             if legend := right.get_legend():  # the same as that on the left
                 legend.remove()
@@ -246,8 +240,10 @@ def library(name: str) -> Any:
         raise ImportError(f"{name} is not installed; pip install {name}", name=name) from None
 
 
-def _check(times: Floats, probes: Floats, values: Floats) -> None:
-    """Refuse times (t,), probes (p, 2 or 3) and values (t, p) of wrong shapes, and uneven times."""
+def _check_shapes(times: Floats, probes: Floats, values: Floats, uneven: float = 1e-6) -> None:
+    """Refuse times (t,), probes (p, 2 or 3) and values (t, p) of wrong shapes, and times whose
+    steps differ by more than a fraction `uneven`.
+    """
     if times.ndim != 1 or not len(times):
         raise ValueError(f"times of a response have shape {times.shape}; give (t,) in s")
     if probes.ndim != 2 or probes.shape[1] not in (2, 3):
@@ -256,7 +252,7 @@ def _check(times: Floats, probes: Floats, values: Floats) -> None:
         raise ValueError(f"values of a response have shape {values.shape}; give {expected}")
     steps = np.diff(times)
     mean = steps.mean() if len(steps) else 1.0
-    if not (mean > 0 and np.abs(steps - mean).max(initial=0.0) <= UNEVEN * mean):
+    if not (mean > 0 and np.abs(steps - mean).max(initial=0.0) <= uneven * mean):
         raise ValueError(
             f"times of a response must rise in equal steps, but the steps are {steps.min():g} to "
             f"{steps.max():g} s; give equally spaced times"
@@ -396,27 +392,25 @@ def is_masked(
     fitted: Bools,
     *,
     settle: float = SETTLE,
+    faint: float = 0.02,
 ) -> Bools:
     """Return a mask (f,) of lines that side lobes of unfitted lines, of amplitudes `rest` (f,), may
-    change by 5 %, or by 5 % of `FAINT` of the strongest. A rhythm that does not repeat masks all.
+    change by 5 %, or by 5 % of `faint` times the strongest.
+
+    A rhythm that repeats too few times in the response masks all.
     """
-    if _is_single(response):
+    rhythm = response.load.tacton.rhythm if response.load else None
+    seconds = step(response.times) * len(response.times)
+    if rhythm and seconds < FEWEST_CYCLES * (1 - SAME_LINE) * rhythm.period:
         return np.ones(len(frequencies), bool)
     if whole_periods(response, settle):
         return np.zeros(len(frequencies), bool)
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
     x = np.pi * (frequencies[:, None] - frequencies[rest > 0]) / least
-    beta = _beta(_closest(distinct, 1 / least))
-    leakage = np.sqrt(_kaiser_transform(x, beta) ** 2 @ rest[rest > 0] ** 2)  # for any phases
-    return np.asarray(leakage > MINOR * np.maximum(strengths, FAINT * strengths.max(initial=0.0)))
-
-
-def _is_single(response: Response) -> bool:
-    """Whether the load has a rhythm that repeats too few times in the response to make lines."""
-    rhythm = response.load.tacton.rhythm if response.load else None
-    seconds = step(response.times) * len(response.times)
-    return rhythm is not None and seconds < FEWEST_CYCLES * (1 - SAME_LINE) * rhythm.period
+    lobes = _kaiser_transform(x, _kaiser_beta(distinct, 1 / least))
+    leakage = np.sqrt(lobes**2 @ rest[rest > 0] ** 2)  # for any phases
+    return np.asarray(leakage > MINOR * np.maximum(strengths, faint * strengths.max(initial=0.0)))
 
 
 def _kaiser_transform(x: Floats, beta: float) -> Floats:
@@ -471,7 +465,7 @@ def _weighted_waves(
     distinct, which = _distinct(frequencies, (1 - ALIKE) / span if whole else 1 / span)
     basis = _waves(distinct, times)
     fitted = basis[:, first:]
-    beta = 0.0 if whole else _beta(_closest(distinct, span))
+    beta = 0.0 if whole else _kaiser_beta(distinct, span)
     weighted = fitted * np.kaiser(fitted.shape[1], beta)
     inverse = np.linalg.pinv(weighted @ fitted.T, rcond=1e-13, hermitian=True)
     return basis, weighted, np.asarray(inverse, np.float64), which
@@ -489,14 +483,13 @@ def _waves(frequencies: Floats, times: Floats) -> Floats:
     return np.concatenate([np.ones((1, len(times))), waves.real, waves.imag])
 
 
-def _closest(frequencies: Floats, span: float) -> float:
-    """Distance in bins of the two closest ascending frequencies, for a fitted time in s."""
-    return float(np.diff(frequencies).min(initial=np.inf) * span)
+def _kaiser_beta(frequencies: Floats, span: float, largest: float = 19.0) -> float:
+    """Beta of a Kaiser window over `span` in s whose main lobe separates ascending frequencies.
 
-
-def _beta(bins: float) -> float:
-    """Kaiser beta for lines at a distance in bins; the main lobe is proportional to it."""
-    lobe = np.hypot(1.0, LINE_BETA / np.pi) * min(bins / LINE_BINS, 1.0)
+    The `largest` resolves lines `LINE_BINS` apart, as weak as its side lobes of -140 dB.
+    """
+    bins = float(np.diff(frequencies).min(initial=np.inf) * span)
+    lobe = np.hypot(1.0, largest / np.pi) * min(bins / LINE_BINS, 1.0)
     return float(np.pi * np.sqrt(max(lobe**2 - 1, 0.0)))
 
 
