@@ -31,6 +31,7 @@ SETTLE = 0.25  # of a response, left out at its start when lines are fitted
 LINE_BINS = 2.5  # bins between lines that the Kaiser window resolves
 ALIKE = 1e-3  # of the frequency resolution: closer lines are one
 MINOR = 0.05  # of a line: most that unresolved neighbours may have together
+UNEVEN = 1e-6  # of a sampling interval: largest deviation of equal steps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -240,10 +241,8 @@ def library(name: str) -> Any:
         raise ImportError(f"{name} is not installed; pip install {name}", name=name) from None
 
 
-def _check_shapes(times: Floats, probes: Floats, values: Floats, uneven: float = 1e-6) -> None:
-    """Refuse times (t,), probes (p, 2 or 3) and values (t, p) of wrong shapes, and times whose
-    steps differ by more than a fraction `uneven`.
-    """
+def _check_shapes(times: Floats, probes: Floats, values: Floats) -> None:
+    """Refuse times (t,), probes (p, 2 or 3) and values (t, p) of wrong shapes, and uneven times."""
     if times.ndim != 1 or not len(times):
         raise ValueError(f"times of a response have shape {times.shape}; give (t,) in s")
     if probes.ndim != 2 or probes.shape[1] not in (2, 3):
@@ -252,7 +251,7 @@ def _check_shapes(times: Floats, probes: Floats, values: Floats, uneven: float =
         raise ValueError(f"values of a response have shape {values.shape}; give {expected}")
     steps = np.diff(times)
     mean = steps.mean() if len(steps) else 1.0
-    if not (mean > 0 and np.abs(steps - mean).max(initial=0.0) <= uneven * mean):
+    if not (mean > 0 and np.abs(steps - mean).max(initial=0.0) <= UNEVEN * mean):
         raise ValueError(
             f"times of a response must rise in equal steps, but the steps are {steps.min():g} to "
             f"{steps.max():g} s; give equally spaced times"

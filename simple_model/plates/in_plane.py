@@ -8,16 +8,15 @@ clips that hold the plate in its plane. At the other edges the energy makes the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import linalg
 
 from simple_model.plates.modes import Plate, outside_clips
-from simple_model.plates.polynomials import LineBasis, continuous_basis, gauss_points
-from simple_model.typing import Bools, Floats, Ints
+from simple_model.plates.polynomials import LineBasis, gauss_points, piecewise_basis
+from simple_model.typing import Floats
 
 # Whether a supported edge holds the in-plane displacement across and along the edge.
 IN_PLANE = {"held": (True, True), "sliding": (True, False), "movable": (False, False)}
@@ -30,27 +29,11 @@ class Grid:
     and `weights` in m.
     """
 
-    breaks: tuple[Floats, Floats]
-    split: tuple[bool, bool]
-    degrees: tuple[list[int], list[int]]
-    points: tuple[Floats, Floats]
-    weights: tuple[Floats, Floats]
-
-    @staticmethod
-    def of(breaks: Sequence[Floats], split: Sequence[bool], degrees: Sequence[list[int]]) -> Grid:
-        """The grid that integrates products of two polynomials of these degrees exactly. Products
-        of functions that are split are even, so that half the points suffice.
-        """
-        (x, of_x), (y, of_y) = (
-            gauss_points(ends, [n + 2 for n in each])
-            for ends, each in zip(breaks, degrees, strict=True)
-        )
-        x, of_x = _half(x, of_x) if split[0] else (x, of_x)
-        y, of_y = _half(y, of_y) if split[1] else (y, of_y)
-        return Grid(
-            breaks=(breaks[0], breaks[1]), split=(split[0], split[1]),
-            degrees=(degrees[0], degrees[1]), points=(x, y), weights=(of_x, of_y),
-        )  # fmt: skip
+    breaks: Sequence[Floats]
+    split: Sequence[bool]
+    degrees: Sequence[list[int]]
+    points: Sequence[Floats]
+    weights: Sequence[Floats]
 
     @property
     def areas(self) -> Floats:
@@ -58,78 +41,67 @@ class Grid:
         return np.outer(*self.weights)
 
 
-def _half(points: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """Points on one side of the middle of a symmetric rule, and weights of even functions there."""
-    count = (len(points) + 1) // 2
-    doubled = 2 * weights[-count:]
-    doubled[0] /= 1 + len(points) % 2
-    return points[-count:], doubled
+def exact_grid(
+    breaks: Sequence[Floats], split: Sequence[bool], degrees: Sequence[list[int]]
+) -> Grid:
+    """Return the grid that integrates products of two polynomials of these degrees exactly."""
+    points, weights = [], []
+    for ends, is_split, each in zip(breaks, split, degrees, strict=True):
+        at, weight = gauss_points(ends, [n + 2 for n in each])
+        if is_split:  # products are even, so half the points are enough
+            is_odd, half = len(at) % 2, len(at) // 2
+            at, weight = at[half:], 2 * weight[half:]
+            weight[0] /= 1 + is_odd
+        points.append(at)
+        weights.append(weight)
+    return Grid(breaks=breaks, split=split, degrees=degrees, points=points, weights=weights)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class InPlane:
-    """In-plane displacement for strains of one symmetry.
+def in_plane_relief(
+    plate: Plate, A: Floats, grid: Grid, odd: Sequence[int], in_plane: str, shift: float = 1e-10
+) -> Callable[[Floats], Floats]:
+    """Return the function from strains (3, p, x, y), xx, yy and 2 xy, to what is left of them after
+    in-plane displacement.
 
-    Parameters
-    ----------
-    A : (3, 3) N/m, stress resultants xx, yy, xy of strains xx, yy and 2 xy
-    grid : Grid
-    u, v : values and slopes of the functions of each component along x and along y
-    free : (n,) products of functions that no clip holds
-    factor : Cholesky factor of their stiffness
+    `A` (3, 3) in N/m is the stiffness of the plate to these strains, `in_plane` a key of
+    `IN_PLANE`. If functions are split, `odd` states the symmetry of the strain xx along x and y. A
+    `shift` of the stiffness by a fraction of its mean permits a plate without support.
     """
+    u, v = (
+        [_Line.of(plate, grid, axis, component, odd[axis], in_plane) for axis in (0, 1)]
+        for component in (0, 1)
+    )
+    K = np.block([
+        [_stiffness(u, A[0, 0], A[2, 2]), _coupling(u, v, A)],
+        [_coupling(u, v, A).T, _stiffness(v, A[2, 2], A[1, 1])],
+    ])  # fmt: skip
+    M = linalg.block_diag(*(np.kron(x.basis.mass, y.basis.mass) for x, y in (u, v)))
+    free = np.arange(len(K))
+    if plate.clips and plate.clip_radius:  # a clip without a radius holds no in-plane motion
+        outside = [outside_clips(plate, x.basis, y.basis) for x, y in (u, v)]
+        free = np.flatnonzero(np.concatenate(outside))
+    if not len(free):
+        return lambda strains: strains
+    K, M = K[np.ix_(free, free)], M[np.ix_(free, free)]
+    factor = linalg.cho_factor(K + shift * np.trace(K) / np.trace(M) * M)
+    (ux, uy), (vx, vy) = u, v
 
-    A: Floats
-    grid: Grid
-    u: tuple[_Line, _Line]
-    v: tuple[_Line, _Line]
-    free: Ints
-    factor: Any
-
-    @staticmethod
-    def of(plate: Plate, A: Floats, grid: Grid, odd: tuple[int, int], in_plane: str) -> InPlane:
-        """The problem of a plate with stiffness A (3, 3) in N/m and edges as in `IN_PLANE`. If
-        functions are split, `odd` states the symmetry of the strain xx along x and y.
-        """
-        u, v = (
-            tuple(
-                _Line.of(grid, axis, _functions(plate, grid, axis, component, odd[axis], in_plane))
-                for axis in (0, 1)
-            )
-            for component in (0, 1)
-        )
-        K = np.block([
-            [_stiffness(u, A[0, 0], A[2, 2]), _coupling(u, v, A)],
-            [_coupling(u, v, A).T, _stiffness(v, A[2, 2], A[1, 1])],
-        ])  # fmt: skip
-        M = linalg.block_diag(*(np.kron(x.basis.mass, y.basis.mass) for x, y in (u, v)))
-        free = np.flatnonzero(np.concatenate([_free_of_clips(plate, *lines) for lines in (u, v)]))
-        K, M = K[np.ix_(free, free)], M[np.ix_(free, free)]
-        factor = None
-        shift = 1e-10  # of the mean stiffness, so that a plate without support can be solved
-        if len(free):
-            factor = linalg.cho_factor(K + shift * np.trace(K) / np.trace(M) * M)
-        return InPlane(A=A, grid=grid, u=(u[0], u[1]), v=(v[0], v[1]), free=free, factor=factor)
-
-    def incompatible(self, strains: Floats) -> Floats:
-        """Strains (3, p, x, y) minus those of the in-plane displacement that relieves them."""
-        if not len(self.free):
-            return strains
-        xx, yy, xy = np.tensordot(self.A, strains, axes=1) * self.grid.areas
-        (ux, uy), (vx, vy) = self.u, self.v
-        gathers = "xi,yj,pxy->ijp"
+    def relieve(strains: Floats) -> Floats:
+        xx, yy, xy = np.tensordot(A, strains, axes=1) * grid.areas
+        gathers, moves = "xi,yj,pxy->ijp", "xi,yj,ijp->pxy"
         of_u = _sum(gathers, (ux.slopes, uy.values, xx), (ux.values, uy.slopes, xy))
         of_v = _sum(gathers, (vx.values, vy.slopes, yy), (vx.slopes, vy.values, xy))
         forces = np.concatenate([f.reshape(-1, f.shape[2]) for f in (of_u, of_v)])
         moved = np.zeros_like(forces)
-        moved[self.free] = -linalg.cho_solve(self.factor, forces[self.free])
+        moved[free] = -linalg.cho_solve(factor, forces[free])
         size = of_u.shape[0] * of_u.shape[1]
-        u, v = moved[:size].reshape(of_u.shape), moved[size:].reshape(of_v.shape)
-        moves = "xi,yj,ijp->pxy"
+        at_u, at_v = moved[:size].reshape(of_u.shape), moved[size:].reshape(of_v.shape)
         return strains + np.stack([
-            _sum(moves, (ux.slopes, uy.values, u)), _sum(moves, (vx.values, vy.slopes, v)),
-            _sum(moves, (ux.values, uy.slopes, u), (vx.slopes, vy.values, v)),
+            _sum(moves, (ux.slopes, uy.values, at_u)), _sum(moves, (vx.values, vy.slopes, at_v)),
+            _sum(moves, (ux.values, uy.slopes, at_u), (vx.slopes, vy.values, at_v)),
         ])  # fmt: skip
+
+    return relieve
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -142,29 +114,18 @@ class _Line:
     weights: Floats
 
     @staticmethod
-    def of(grid: Grid, axis: int, basis: LineBasis) -> _Line:
-        at = grid.points[axis]
+    def of(plate: Plate, grid: Grid, axis: int, component: int, odd: int, in_plane: str) -> _Line:
+        names = (("left", "right"), ("front", "back"))[axis]
+        holds = IN_PLANE[in_plane][axis != component]
+        ends = ["simply" if holds and getattr(plate, name) != "free" else "free" for name in names]
+        bases = piecewise_basis(
+            grid.breaks[axis], ends, grid.degrees[axis], grid.split[axis], inner="simply"
+        )
+        # An even strain xx has a u that is odd along x and even along y.
+        basis, at = bases[odd ^ (axis == component) if len(bases) == 2 else 0], grid.points[axis]
         return _Line(
             basis=basis, values=basis(at), slopes=basis.slopes(at), weights=grid.weights[axis]
         )
-
-
-def _functions(
-    plate: Plate, grid: Grid, axis: int, component: int, odd: int, in_plane: str
-) -> LineBasis:
-    names = (("left", "right"), ("front", "back"))[axis]
-    holds = IN_PLANE[in_plane][axis != component]
-    ends = ["simply" if holds and getattr(plate, name) != "free" else "free" for name in names]
-    lines = continuous_basis(grid.breaks[axis], ends, grid.degrees[axis], grid.split[axis])
-    # An even strain xx has a u that is odd along x and even along y.
-    return lines[odd ^ (axis == component)] if len(lines) == 2 else lines[0]
-
-
-def _free_of_clips(plate: Plate, x: _Line, y: _Line) -> Bools:
-    """Products (n,) that no clip holds; a clip without a radius holds none."""
-    if not (plate.clips and plate.clip_radius):
-        return np.ones(x.basis.size * y.basis.size, bool)
-    return outside_clips(plate, x.basis, y.basis)
 
 
 def _stiffness(lines: Sequence[_Line], along_x: float, along_y: float) -> Floats:

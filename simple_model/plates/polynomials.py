@@ -101,35 +101,20 @@ def line_basis(
 
 
 def piecewise_basis(
-    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
+    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool, inner: str = "clamped"
 ) -> tuple[LineBasis, ...]:
-    """Functions with continuous slopes at the breaks (e + 1,) of a line, in m from the middle, up
-    to `degrees` (e,) of 3 or more on each piece; with `split`, even and odd functions in two bases.
-    """
-    return _pieces(breaks, ends, degrees, split, "clamped")
+    """Functions up to `degrees` (e,) on the pieces between breaks (e + 1,) of a line, in m from the
+    middle; with `split`, even and odd functions in two bases.
 
-
-def continuous_basis(
-    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
-) -> tuple[LineBasis, ...]:
-    """Functions that are continuous but have kinks at the breaks of a line. Ends either fix the
-    value, "simply", or not, "free"; see `piecewise_basis` for the rest.
+    At breaks they are continuous in what the support `inner` fixes: value and slope if "clamped",
+    with degrees of 3 or more, the value alone if "simply".
     """
     if len(breaks) == 2:
         return line_basis(float(np.ptp(breaks)), ends, degrees[0], split)
-    return _pieces(breaks, ends, degrees, split, "simply")
-
-
-def _pieces(
-    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool, inner: str
-) -> tuple[LineBasis, ...]:
-    """Bases of functions that are continuous in what the support `inner` of a bubble fixes."""
-    breaks = np.asarray(breaks, np.float64)
     nodal = _at_breaks(breaks, ends, degrees, FIXED[inner])
     functions = np.stack([*nodal, *_inner(degrees, (inner, inner))], axis=2)
-    if not split:
-        return (_basis(breaks, functions),)
-    return tuple(_basis(breaks, part) for part in _symmetric(functions))
+    parts = _symmetric(functions) if split else (functions,)
+    return tuple(_basis(breaks, part) for part in parts)
 
 
 def _basis(breaks: Floats, coefficients: Floats) -> LineBasis:
@@ -152,8 +137,8 @@ def _basis(breaks: Floats, coefficients: Floats) -> LineBasis:
 def _at_breaks(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], derivatives: Sequence[int]
 ) -> Iterator[Floats]:
-    """Coefficients (e, n) of a function of each value, and each slope, that is free at a break,
-    orthogonal to the bubbles.
+    """Coefficients (e, n) of one function per free value or slope at a break, orthogonal to the
+    bubbles.
     """
     last, count = len(breaks) - 1, len(derivatives)
     of_piece = [

@@ -20,7 +20,7 @@ Only the lowest modes stretch the plate. The others keep their stiffness at rest
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg
 
 from simple_model.choices import choose
-from simple_model.plates.in_plane import IN_PLANE, Grid, InPlane
+from simple_model.plates.in_plane import IN_PLANE, Grid, exact_grid, in_plane_relief
 from simple_model.plates.modes import Family, Plate, PlateModes
 from simple_model.typing import Floats, Ints
 
@@ -121,9 +121,9 @@ def karman_plate(
     reach = 1 / np.maximum(squared, equal_below**2)
     A, found = membrane_stiffness(modes.plate, thickness), []
     for odd in product(*((0, 1) if split else (0,) for split in slopes.grid.split)):
-        problem = InPlane.of(modes.plate, A, slopes.grid, (odd[0], odd[1]), in_plane)
+        relieve = in_plane_relief(modes.plate, A, slopes.grid, odd, in_plane)
         turn = 2 * odd[0] + odd[1]
-        found.append((turn, *_states_of_stress(problem, slopes, reach, turn)))
+        found.append((turn, *_states_of_stress(A, relieve, slopes, reach, turn)))
     energy = np.concatenate([each for _, each, _ in found])
     smallest_state = 0.06  # of the largest energy norm of a state of stress
     least = smallest_state**2 * energy.max()
@@ -165,14 +165,11 @@ class _Slopes:
 
     @staticmethod
     def of(modes: PlateModes, chosen: Ints) -> _Slopes:
-        families, first = [], 0
-        for f in modes.families:
-            own = chosen[(chosen >= first) & (chosen < first + len(f.squared))] - first
-            families.append((f, f.shapes[..., own]))
-            first += len(f.squared)
+        is_chosen = np.isin(np.arange(len(modes.squared)), chosen)
+        families = [(f, f.shapes[..., is_chosen[part]]) for f, part in modes.parts]
         lines = [list(dict.fromkeys(getattr(f, name) for f in modes.families)) for name in "xy"]
         breaks = [each[0].breaks for each in lines]
-        grid = Grid.of(breaks, [len(each) == 2 for each in lines], _degrees(families, breaks))
+        grid = exact_grid(breaks, [len(each) == 2 for each in lines], _degrees(families, breaks))
         x, y = grid.points
         along, across = (
             np.concatenate([
@@ -224,16 +221,15 @@ def _degrees(
         )
         for axis, slope in enumerate(slopes):
             largest[axis] = max(largest[axis], np.sqrt((slope / moved).max(initial=0.0)))
-    margin = 8  # polynomials more than products of two modes require
-    clip_margin = 4  # the same on a piece between the sides of clips
+    margins = [8 if len(each) == 2 else 4 for each in breaks]  # fewer between the sides of clips
     return [
-        [int(np.ceil(k * piece)) + (margin if len(b) == 2 else clip_margin) for piece in np.diff(b)]
-        for k, b in zip(largest, breaks, strict=True)
+        [int(np.ceil(k * piece)) + margin for piece in np.diff(each)]
+        for k, margin, each in zip(largest, margins, breaks, strict=True)
     ]
 
 
 def _states_of_stress(
-    problem: InPlane, slopes: _Slopes, reach: Floats, turn: int
+    A: Floats, relieve: Callable[[Floats], Floats], slopes: _Slopes, reach: Floats, turn: int
 ) -> tuple[Floats, Floats]:
     """States of stress of one symmetry, orthonormal in energy, from the strongest pairs of modes:
     relative energy (k,) of stretching in each, and its stress resultants times areas (3, x, y, k).
@@ -244,8 +240,8 @@ def _states_of_stress(
     if not len(i):
         return np.zeros(0), np.zeros((3, *slopes.grid.areas.shape, 0))
     weight = reach[i] * reach[j] * np.where(i == j, 1, 2) / reach.max() ** 2
-    strains = problem.incompatible(slopes.stretching(i, j) * weight[:, None, None])
-    weighted = np.tensordot(problem.A, strains, axes=1) * slopes.grid.areas
+    strains = relieve(slopes.stretching(i, j) * weight[:, None, None])
+    weighted = np.tensordot(A, strains, axes=1) * slopes.grid.areas
     gram = np.tensordot(strains, weighted, axes=([0, 2, 3], [0, 2, 3]))
     energy, vectors = np.linalg.eigh((gram + gram.T) / 2)
     round_off = 1e-10  # of the largest energy of a state of stress
