@@ -30,8 +30,8 @@ from simple_model.choices import check_numbers, choose
 from simple_model.layers.compliance import AIR_DENSITY
 from simple_model.layers.material import ModulusLaw
 from simple_model.plates.air import AirLoss, air_of
-from simple_model.plates.polynomials import LineBasis, line_basis, piecewise_basis
-from simple_model.typing import Bools, Complex, Floats, Ints
+from simple_model.plates.polynomials import FIXED, LineBasis, piecewise_basis
+from simple_model.typing import Bools, Complex, Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,9 +86,8 @@ class Plate:
                 f"d12 = {self.d12} of a plate is not below sqrt(d11 d22) = "
                 f"{(self.d11 * self.d22) ** 0.5:.4g}, so the plate would be unstable; lower d12"
             )
-        supports = ("clamped", "simply", "free")
         for name in ("left", "right", "front", "back"):
-            choose(name, getattr(self, name), supports)
+            choose(name, getattr(self, name), FIXED)
         for x, y in self.clips:
             if not (abs(x) <= self.size_x / 2 and abs(y) <= self.size_y / 2):
                 raise ValueError(
@@ -235,9 +234,10 @@ def modal_motion(
         own = _own_stiffness(family, modes.plate.edge_loss, w, added)
         couples = (family.bending is not None) & (added != 0) | (family.air is not None) & (w > 0)
         coordinates[:, part] = forces[:, part] / own
-        for some in _chunks(np.flatnonzero(couples)):
-            system = _Coupled.of(family, w[some], added[some], own[some])
-            coordinates[some, part] = system.solve(forces[some, part])
+        lines = np.flatnonzero(couples)
+        for some in np.array_split(lines, -(-len(lines) // 64)) if len(lines) else []:
+            of_lines = w[some], added[some], own[some], forces[some, part]
+            coordinates[some, part] = _solve_coupled(family, *of_lines)
     return coordinates
 
 
@@ -262,99 +262,74 @@ def _own_stiffness(family: Family, edge_loss: float, w: Floats, added: Complex) 
     return np.asarray(own, np.complex128)
 
 
-def _chunks(lines: Ints) -> list[Ints]:
-    return np.array_split(lines, -(-len(lines) // 64)) if len(lines) else []
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Coupled:
-    """Coupled modes of a family, of `squared` (m,) natural frequencies, at angular frequencies `w`
-    (f,).
+def _solve_coupled(
+    family: Family, w: Floats, added: Complex, own: Complex, forces: Complex,
+    *, most_steps: int = 30, residual: float = 1e-10, coupled: float = 1.3,
+) -> Complex:  # fmt: skip
+    """Coordinates (f, m) of coupled modes under forces (f, m) at angular frequencies w (f,).
 
     `own` (f, m) are the dynamic stiffnesses of each mode alone. Modes are coupled by `added` (f,)
-    times `bending` (m, m), whose diagonal is 0, and by patterns^T sound patterns with `patterns`
-    (q, m) and `sound` (f, q, q). The diagonals of that, `alone` (f, m), are part of `own`.
+    times the stiffness of bending, and by sound. Conjugate gradients for complex symmetric matrices
+    (van der Vorst and Melissen, IEEE Trans Magn 26:706 (1990)) end at a `residual` of the largest
+    force. The preconditioner solves modes within a factor `coupled` of a line's frequency together
+    and all others alone. Lines that need more than `most_steps` are solved directly.
     """
+    m = len(family.squared)
+    bending = np.zeros((m, m)) if family.bending is None else family.bending.copy()
+    np.fill_diagonal(bending, 0.0)
+    patterns, sound = np.zeros((0, m)), np.zeros((len(w), 0, 0))
+    if family.air is not None:
+        patterns, sound = family.air.patterns, family.air.radiation(w)
+    sound = np.asarray(1j * w[:, None, None] * sound, np.complex128)
+    alone = ((sound @ patterns) * patterns).sum(axis=1)  # part of `own`
 
-    squared: Floats
-    w: Floats
-    own: Complex
-    added: Complex
-    bending: Floats
-    patterns: Floats
-    sound: Complex
-    alone: Complex
+    def image_of(q: Complex) -> Complex:
+        bent = q.real @ bending + 1j * (q.imag @ bending)  # real, which is faster
+        radiated = (sound @ (q @ patterns.T)[..., None])[..., 0] @ patterns
+        return np.asarray(own * q + (added[:, None] * bent + radiated - alone * q))
 
-    @staticmethod
-    def of(family: Family, w: Floats, added: Complex, own: Complex) -> "_Coupled":
-        m = len(family.squared)
-        bending = np.zeros((m, m)) if family.bending is None else family.bending.copy()
-        bending[np.diag_indices(m)] = 0.0
-        patterns, sound = np.zeros((0, m)), np.zeros((len(w), 0, 0))
-        if family.air is not None:
-            patterns, sound = family.air.patterns, family.air.radiation(w)
-        dynamic = np.asarray(1j * w[:, None, None] * sound, np.complex128)
-        return _Coupled(
-            squared=family.squared, w=w, own=own, added=added, bending=bending, patterns=patterns,
-            sound=dynamic, alone=((dynamic @ patterns) * patterns).sum(axis=1),
-        )  # fmt: skip
-
-    def between(self, q: Complex) -> Complex:
-        """Forces (f, m) of all other modes."""
-        bent = q.real @ self.bending + 1j * (q.imag @ self.bending)  # real, which is faster
-        radiated = (self.sound @ (q @ self.patterns.T)[..., None])[..., 0] @ self.patterns
-        return np.asarray(self.added[:, None] * bent + radiated - self.alone * q)
-
-    def block(self, k: int, modes: slice) -> Complex:
+    def block(k: int, modes: slice) -> Complex:
         """Dynamic stiffness (n, n) of some modes at a line."""
-        near = self.patterns[:, modes]
-        block = self.added[k] * self.bending[modes, modes] + near.T @ self.sound[k] @ near
-        block[np.diag_indices(len(block))] += (self.own - self.alone)[k, modes]
-        return np.asarray(block)
+        near = patterns[:, modes]
+        stiffness = added[k] * bending[modes, modes] + near.T @ sound[k] @ near
+        stiffness[np.diag_indices(len(stiffness))] += (own - alone)[k, modes]
+        return np.asarray(stiffness)
 
-    def solve(self, forces: Complex) -> Complex:
-        """Coordinates (f, m) under forces (f, m), by conjugate gradients for complex symmetric
-        matrices (van der Vorst and Melissen, IEEE Trans Magn 26:706 (1990)). The preconditioner
-        solves modes near a line together and all others alone.
-        """
-        coupled = 1.3  # of a line's frequency: other modes are almost uncoupled
-        low, high = (
-            np.searchsorted(self.squared, (self.w * factor) ** 2)
-            for factor in (1 / coupled, coupled)
-        )
-        near = [slice(*each) for each in zip(low.tolist(), high.tolist(), strict=True)]
-        factors = [
-            zgetrf(self.block(k, modes))[:2] if modes.stop > modes.start else None
-            for k, modes in enumerate(near)
-        ]
+    low, high = (
+        np.searchsorted(family.squared, (w * factor) ** 2) for factor in (1 / coupled, coupled)
+    )
+    near = [slice(*each) for each in zip(low.tolist(), high.tolist(), strict=True)]
+    factors = [
+        zgetrf(block(k, modes))[:2] if modes.stop > modes.start else None
+        for k, modes in enumerate(near)
+    ]
 
-        def together(left: Complex) -> Complex:
-            q = left / self.own
-            for k, (modes, factor) in enumerate(zip(near, factors, strict=True)):
-                if factor is not None:
-                    q[k, modes] = zgetrs(*factor, left[k, modes])[0]
-            return np.asarray(q)
+    def precondition(left: Complex) -> Complex:
+        q = left / own
+        for k, (modes, factor) in enumerate(zip(near, factors, strict=True)):
+            if factor is not None:
+                q[k, modes] = zgetrs(*factor, left[k, modes])[0]
+        return np.asarray(q)
 
-        residual = 1e-10  # of the largest force, of the solution for coupled modes
-        allowed = residual * np.abs(forces).max(axis=1)
-        q, left = np.zeros_like(self.own), forces.astype(np.complex128)
-        toward = along = together(left)
+    allowed = residual * np.abs(forces).max(axis=1)
+    q, left = np.zeros_like(own), forces.astype(np.complex128)
+    toward = along = precondition(left)
+    size = (left * toward).sum(axis=1)
+    for _ in range(most_steps):
+        image = image_of(along)
+        with np.errstate(divide="ignore", invalid="ignore"):  # of lines that are solved
+            step = np.nan_to_num(size / (along * image).sum(axis=1), posinf=0.0)[:, None]
+        q, left = q + step * along, left - step * image
+        open_lines = ~(np.abs(left).max(axis=1) <= allowed)
+        if not open_lines.any():
+            return q
+        toward, before = precondition(left), size
         size = (left * toward).sum(axis=1)
-        for _ in range(30):
-            image = self.own * along + self.between(along)
-            with np.errstate(divide="ignore", invalid="ignore"):  # of lines that are solved
-                step = np.nan_to_num(size / (along * image).sum(axis=1), posinf=0.0)[:, None]
-            q, left = q + step * along, left - step * image
-            open_lines = ~(np.abs(left).max(axis=1) <= allowed)
-            if not open_lines.any():
-                return q
-            toward, before = together(left), size
-            size = (left * toward).sum(axis=1)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                along = toward + np.nan_to_num(size / before, posinf=0.0)[:, None] * along
-        for k in np.flatnonzero(open_lines).tolist():
-            q[k] = np.linalg.solve(self.block(k, slice(None)), forces[k])
-        return q
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along = toward + np.nan_to_num(size / before, posinf=0.0)[:, None] * along
+    for k in np.flatnonzero(open_lines).tolist():
+        q[k] = np.linalg.solve(block(k, slice(None)), forces[k])
+    return q
 
 
 def _symmetries(plate: Plate) -> tuple[bool, bool]:
@@ -375,12 +350,9 @@ def _line_bases(plate: Plate, axis: int, finest: float, mirrored: bool) -> tuple
     """Functions along x or y up to a wavenumber in rad/m, on pieces between sides of clips."""
     size = (plate.size_x, plate.size_y)[axis]
     ends = ((plate.left, plate.right), (plate.front, plate.back))[axis]
-    margin = 8  # polynomials more than a wavenumber requires
-    if not (inner := _breaks(plate, axis, size)):
-        return line_basis(size, ends, int(np.ceil(finest * size / 2)) + margin, mirrored)
-    breaks = np.array([-size / 2, *inner, size / 2])
-    clip_margin = 3  # the same for pieces between the sides of clips
-    degrees = [int(np.ceil(finest * piece / 2)) + clip_margin for piece in np.diff(breaks)]
+    breaks = np.array([-size / 2, *_breaks(plate, axis, size), size / 2])
+    margin = 8 if len(breaks) == 2 else 3  # more than required; fewer between the sides of clips
+    degrees = [int(np.ceil(finest * piece / 2)) + margin for piece in np.diff(breaks)]
     return piecewise_basis(breaks, ends, degrees, mirrored)
 
 
@@ -390,11 +362,10 @@ def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
     """
     reach = plate.clip_radius
     sides = [clip[axis] + turn * reach for clip in plate.clips for turn in (-1, 1) if reach]
-    same_side = 0.01  # of the radius of a clip: sides and edges closer than that coincide
-    inside = _apart([], sides, size / 2, same_side * reach)
-    layer = 0.1  # of the radius of a clip, width of a piece along its sides
-    lines = [at + turn * layer * reach for at in inside for turn in (-1, 1)]
-    return sorted(_apart(inside, lines, size / 2, layer * reach / 2))
+    inside = _apart([], sides, size / 2, 0.01 * reach)  # closer sides and edges coincide
+    layer = 0.1 * reach  # width of a piece along the sides of a clip
+    lines = [at + turn * layer for at in inside for turn in (-1, 1)]
+    return sorted(_apart(inside, lines, size / 2, layer / 2))
 
 
 def _apart(first: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
@@ -410,22 +381,19 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     bending, stretching = _stiffness(plate, x, y)
     area = np.kron(x.mass, y.mass)
     mass = np.asarray(plate.mass_per_area * area, np.float64)
-    patterns, orders = np.zeros((0, len(mass))), np.zeros((0, 2), np.int64)
-    tie = 1e-9  # of the mass: of equal frequencies, one mode radiates
     if plate.air_density:
         added, patterns, orders = air_of(x, y, plate.air_density, plate.frame_width)
         mass += added
         for radiating in patterns[:1]:
             unit = radiating / np.linalg.norm(radiating)
-            mass += tie * plate.mass_per_area * np.outer(unit, unit)
+            # 1e-9 of the mass, so that of equal frequencies one mode radiates.
+            mass += 1e-9 * plate.mass_per_area * np.outer(unit, unit)
     K = bending if stretching is None else bending + stretching
-    free = _free_of_clips(plate, x, y)
-    if free is None:
-        squared, shapes = _modes(K, mass)
-    else:
-        reduced = (np.asarray(free.T @ each @ free, np.float64) for each in (K, mass))
-        squared, shapes = _modes(*reduced)
-        shapes = free @ shapes
+    free = _free_of_clips(plate, x, y) if plate.clips else None
+    if free is not None:
+        K, mass = (np.asarray(free.T @ each @ free, np.float64) for each in (K, mass))
+    squared, shapes = _modes(K, mass)
+    shapes = shapes if free is None else free @ shapes
     between = None if stretching is None else np.asarray(shapes.T @ (bending @ shapes))
     air = None
     if plate.air_density:
@@ -445,8 +413,7 @@ def _modes(K: Floats, M: Floats) -> tuple[Floats, Floats]:
     Solves M x = K x / w^2, because the error scales with the largest eigenvalue; a shift permits
     rigid motion.
     """
-    relative_shift = 1e-12  # of the mean squared frequency
-    shift = relative_shift * np.trace(K) / np.trace(M)
+    shift = 1e-12 * np.trace(K) / np.trace(M)
     inverse, shapes = linalg.eigh(M, K + shift * M, check_finite=False, overwrite_b=True)
     inverse = np.maximum(inverse[::-1], np.finfo(float).eps * inverse[-1])
     return 1 / inverse - shift, shapes[:, ::-1] / np.sqrt(inverse)
@@ -467,10 +434,8 @@ def _stiffness(plate: Plate, x: LineBasis, y: LineBasis) -> tuple[Floats, Floats
     return bending, np.kron(along, y.mass) + np.kron(x.mass, across)
 
 
-def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array | Floats | None:
-    """Basis (n, r) of motion with the clips at rest; None without clips."""
-    if not plate.clips:
-        return None
+def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array | Floats:
+    """Basis (n, r) of motion with the clips at rest."""
     if plate.clip_radius:
         return sparse.csr_array(np.eye(x.size * y.size)[:, outside_clips(plate, x, y)])
     xs, ys = np.array(plate.clips).T
