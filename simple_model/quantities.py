@@ -46,7 +46,6 @@ class Quantity:
     name, symbol, words : str, for scenes and files, for formulas (TeX), and for sentences
     unit : str, SI
     shown, per_unit : str, float, unit on axes and in tables, and how many make the SI unit
-    column : str, of lines.csv
     field : NORMAL, VECTOR or STRAIN, the field of a body to read; "" for none
     rows : material -> components (c, k) of the field (k,) at rest
     rate : int, order of the time derivative
@@ -60,7 +59,6 @@ class Quantity:
     unit: str
     shown: str
     per_unit: float = 1.0
-    column: str
     field: str = NORMAL
     rows: Rows = lambda material: np.eye(1)
     rate: int = 0
@@ -70,6 +68,12 @@ class Quantity:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle by name, so that other processes use the registered quantity."""
         return quantity, (self.name,)
+
+    @property
+    def column(self) -> str:
+        """Its column in tables: its name and, in ASCII letters, its unit."""
+        unit = self.shown.translate(str.maketrans("µ²³/", "u23_"))
+        return f"{self.name}_{unit.lower()}"
 
     @property
     def of_body(self) -> bool:
@@ -119,71 +123,48 @@ def _identity(size: int) -> Rows:
     return lambda material: np.eye(size)
 
 
-DISPLACEMENT = register(
+DISPLACEMENT, VELOCITY, ACCELERATION, PRESSURE = map(register, (
     Quantity(
         name="displacement", symbol="u_n", words="displacement into the body", unit="m",
-        shown="µm", per_unit=1e6, column="displacement_um",
-    )
-)  # fmt: skip
-VELOCITY = register(
+        shown="µm", per_unit=1e6,
+    ),
     Quantity(
         name="velocity", symbol="v_n", words="velocity into the body", unit="m/s", shown="mm/s",
-        per_unit=1e3, column="velocity_mm_s", rate=1,
-    )
-)  # fmt: skip
-ACCELERATION = register(
+        per_unit=1e3, rate=1,
+    ),
     Quantity(
         name="acceleration", symbol="a_n", words="acceleration into the body", unit="m/s2",
-        shown="m/s²", column="acceleration_m_s2", rate=2,
-    )
-)  # fmt: skip
-PRESSURE = register(
+        shown="m/s²", rate=2,
+    ),
     Quantity(
         name="pressure", symbol="q", words="pressure of the point kernel", unit="Pa", shown="Pa",
-        column="pressure_pa", field="",
-    )
-)  # fmt: skip
+        field="",
+    ),
+))  # fmt: skip
 for _k, _axis in enumerate("xyz"):
-    register(
-        Quantity(
-            name=f"displacement_{_axis}", symbol=f"u_{_axis}", words=f"displacement along {_axis}",
-            unit="m", shown="µm", per_unit=1e6, column=f"displacement_{_axis}_um", field=VECTOR,
-            rows=_choose(_identity(3), _k),
-        )
-    )  # fmt: skip
+    register(Quantity(
+        name=f"displacement_{_axis}", symbol=f"u_{_axis}", words=f"displacement along {_axis}",
+        unit="m", shown="µm", per_unit=1e6, field=VECTOR, rows=_choose(_identity(3), _k),
+    ))  # fmt: skip
 for _k, _pair in enumerate(COMPONENTS):
-    register(
-        Quantity(
-            name=f"strain_{_pair}", symbol=rf"\varepsilon_{{{_pair}}}",
-            words=f"strain {_pair}", unit="1", shown="µm/m", per_unit=1e6,
-            column=f"strain_{_pair}_um_m", field=STRAIN, rows=_choose(_identity(6), _k),
-        )
-    )  # fmt: skip
-    register(
-        Quantity(
-            name=f"stress_{_pair}", symbol=rf"\sigma_{{{_pair}}}",
-            words=f"stress {_pair}", unit="Pa", shown="Pa", column=f"stress_{_pair}_pa",
-            field=STRAIN, rows=_choose(hooke, _k), relaxes=True,
-        )
-    )  # fmt: skip
-register(
-    Quantity(
-        name="largest_shear_strain", symbol=r"\gamma_{max}", words="largest shear strain", unit="1",
-        shown="µm/m", per_unit=1e6, column="largest_shear_strain_um_m", field=STRAIN,
-        rows=_identity(6), invariant=largest_shear,
-    )
-)  # fmt: skip
-register(
-    Quantity(
-        name="von_mises_stress", symbol=r"\sigma_{vM}", words="von Mises stress",
-        unit="Pa", shown="Pa", column="von_mises_stress_pa", field=STRAIN, rows=hooke, relaxes=True,
-        invariant=von_mises,
-    )
-)  # fmt: skip
-register(
-    Quantity(
-        name="energy_density", symbol="W", words="elastic strain energy density at the moduli at "
-        "rest", unit="J/m3", shown="mJ/m³", per_unit=1e3, column="energy_density_mj_m3",
-        field=STRAIN, rows=energy_root, invariant=sum_of_squares,
-    )
-)  # fmt: skip
+    register(Quantity(
+        name=f"strain_{_pair}", symbol=rf"\varepsilon_{{{_pair}}}", words=f"strain {_pair}",
+        unit="1", shown="µm/m", per_unit=1e6, field=STRAIN, rows=_choose(_identity(6), _k),
+    ))  # fmt: skip
+    register(Quantity(
+        name=f"stress_{_pair}", symbol=rf"\sigma_{{{_pair}}}", words=f"stress {_pair}",
+        unit="Pa", shown="Pa", field=STRAIN, rows=_choose(hooke, _k), relaxes=True,
+    ))  # fmt: skip
+register(Quantity(
+    name="largest_shear_strain", symbol=r"\gamma_{max}", words="largest shear strain", unit="1",
+    shown="µm/m", per_unit=1e6, field=STRAIN, rows=_identity(6), invariant=largest_shear,
+))  # fmt: skip
+register(Quantity(
+    name="von_mises_stress", symbol=r"\sigma_{vM}", words="von Mises stress", unit="Pa",
+    shown="Pa", field=STRAIN, rows=hooke, relaxes=True, invariant=von_mises,
+))  # fmt: skip
+register(Quantity(
+    name="energy_density", symbol="W", words="elastic strain energy density at the moduli at rest",
+    unit="J/m3", shown="mJ/m³", per_unit=1e3, field=STRAIN, rows=energy_root,
+    invariant=sum_of_squares,
+))  # fmt: skip

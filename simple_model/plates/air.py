@@ -44,9 +44,6 @@ from simple_model.plates.polynomials import LineBasis, gauss_points
 from simple_model.typing import Floats, Ints
 
 STEP = 0.6  # in log t: 1/k within 8e-4
-NEAREST = 0.3  # over the highest wavenumber: for smaller t all Gaussians are 1
-FARTHEST = 100.0  # sides: larger t contribute 1e-3 of the mass
-ORDER = 6  # of moments
 ZERO = 1e-9  # of the largest integral, of functions that another symmetry excludes
 
 
@@ -109,11 +106,13 @@ class AirLoss:
 
 
 def air_of(
-    x: LineBasis, y: LineBasis, density: float, frame: float = np.inf
+    x: LineBasis, y: LineBasis, density: float, frame: float = np.inf, order: int = 6
 ) -> tuple[Floats, Floats, Ints]:
     """Added mass (x y, x y) in kg/m2, y fastest, of products of functions, and their `patterns` and
-    `orders` for `AirLoss`; density in kg/m3, width of a rigid frame around the plate in m, inf for
-    a baffle.
+    `orders` for `AirLoss`.
+
+    The density is in kg/m3, the width of a rigid frame around the plate in m, inf for a baffle,
+    whose sound follows from moments up to an `order`.
     """
     if frame < np.inf:
         couplings = [_edge_coupling(line, frame) for line in (x, y)]
@@ -127,8 +126,8 @@ def air_of(
         forces = [np.kron(of_x, of_y).T @ (inverse @ whole)] if whole.any() else []
         patterns = np.reshape(forces, (len(forces), x.size * y.size))
         return mass.reshape(2 * (x.size * y.size,)), patterns, np.zeros((0, 2), np.int64)
-    highest = max(2 * line.legendre[..., 0].size / line.length for line in (x, y))
-    distances = _distances(NEAREST / highest, FARTHEST * max(x.length, y.length))
+    detail = min(line.length / (2 * line.legendre[..., 0].size) for line in (x, y))
+    distances = _distances(detail, max(x.length, y.length))
     along, across = (
         np.stack([_gaussian_products(partial(_transforms, line), line.length, t)[0]
                   for t in distances])
@@ -137,8 +136,8 @@ def air_of(
     mass = _sum_over_distances(distances, [(along, across)])
     # The rest of the rule below its first node, whose weight includes half a step.
     mass += STEP * distances[0] / (np.exp(STEP) - 1) * np.kron(x.mass, y.mass)
-    moments_x, moments_y = _moments(x), _moments(y)
-    exponents = [(a, b) for a in moments_x for b in moments_y if a + b <= ORDER]
+    moments_x, moments_y = _moments(x, order), _moments(y, order)
+    exponents = [(a, b) for a in moments_x for b in moments_y if a + b <= order]
     patterns = np.stack([np.kron(moments_x[a], moments_y[b]) for a, b in exponents])
     return 4 / np.sqrt(pi) * density * mass, patterns, np.array(exponents)
 
@@ -153,17 +152,15 @@ def open_air(
     Returns the coefficients (k, k) in kg/m6 per integral of the acceleration with each product, and
     the integrals (k,) in m2 of the products.
     """
-    each_orders = [np.array(each) for each in orders]
+    lines = [(size, np.array(n)) for size, n in zip(sizes, orders, strict=True)]
     # Where k is large, transforms decay as k^(-3/2) beyond the square of the order only.
-    nearest = NEAREST * min(
-        size / (1 + n.max()) ** 2 for size, n in zip(sizes, each_orders, strict=True)
-    )
-    distances = _distances(nearest, FARTHEST * max(sizes))
+    detail = min(size / (1 + n.max()) ** 2 for size, n in lines)
+    distances = _distances(detail, max(sizes))
     (x, slope_x), (y, slope_y) = (
         map(np.stack, zip(*(
             _gaussian_products(partial(_edge_transforms, n, size), size, t) for t in distances
         ), strict=True))
-        for size, n in zip(sizes, each_orders, strict=True)
+        for size, n in lines
     )  # fmt: skip
     pairs = [(slope_x, y), (x, slope_y)]
     inertia = _sum_over_distances(distances, pairs)
@@ -173,13 +170,9 @@ def open_air(
     rest = first / (1 - ratio) + (first - second) / (1 - ratio) ** 2
     inertia += STEP * distances[0] * ratio * rest
     # int sqrt(1 - s^2) ds = pi / 2 for order 0
-    of_x, of_y = (
-        np.where(n == 0, pi / 4 * size, 0.0) for size, n in zip(sizes, each_orders, strict=True)
-    )
+    of_x, of_y = (np.where(n == 0, pi / 4 * size, 0.0) for size, n in lines)
     whole = np.asarray(np.kron(of_x, of_y), np.float64)
-    inverse = np.asarray(
-        linalg.inv(inertia / (np.sqrt(pi) * density), check_finite=False), np.float64
-    )
+    inverse: Floats = linalg.inv(inertia / (np.sqrt(pi) * density), check_finite=False)
     for kept in (inverse, whole):
         kept.setflags(write=False)
     return inverse, whole
@@ -222,18 +215,21 @@ def _bessel(orders: Ints, kappa: Floats) -> Floats:
     return np.hstack([jv(orders[:, None], kappa[:few]), rest])
 
 
-def _moments(line: LineBasis) -> dict[int, Floats]:
-    """Integrals (i,) of the functions of a line times powers of x, by those that are not zero."""
-    counts = [line.legendre.shape[1] + ORDER] * (len(line.breaks) - 1)
+def _moments(line: LineBasis, order: int) -> dict[int, Floats]:
+    """Integrals (i,) of the functions of a line times powers of x up to an order, by power; those
+    that are zero are left out.
+    """
+    counts = [line.legendre.shape[1] + order] * (len(line.breaks) - 1)
     x, weights = gauss_points(line.breaks, counts)
     values, half = line(x), line.length / 2
-    each = {a: (weights * (x / half) ** a) @ values for a in range(ORDER + 1)}
+    each = {a: (weights * (x / half) ** a) @ values for a in range(order + 1)}
     least = ZERO * max(np.abs(moment).max() for moment in each.values())
     return {a: half**a * moment for a, moment in each.items() if np.abs(moment).max() > least}
 
 
-def _distances(nearest: float, farthest: float) -> Floats:
-    return np.exp(np.arange(np.log(nearest), np.log(farthest), STEP))
+def _distances(detail: float, side: float) -> Floats:
+    """Nodes t in m: for smaller ones all Gaussians are 1, larger ones add 1e-3 of the mass."""
+    return np.exp(np.arange(np.log(0.3 * detail), np.log(100 * side), STEP))
 
 
 def _sum_over_distances(distances: Floats, pairs: Sequence[tuple[Floats, Floats]]) -> Floats:

@@ -26,12 +26,11 @@ def modal_path_forces(
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     detail = spot_detail(pressure.height, pressure.profile)
     sizes = modes.plate.size_x, modes.plate.size_y
-    lines = [
+    (x, of_x), (y, of_y) = (
         _gauss(max(low - reach, at - size / 2), min(high + reach, at + size / 2), detail)
         for low, high, at, size in zip(
             knots.min(axis=0), knots.max(axis=0), middle, sizes, strict=True)
-    ]  # fmt: skip
-    (x, of_x), (y, of_y) = lines
+    )  # fmt: skip
     shapes = modes.on_grid(x - middle[0], y - middle[1])
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     return path_forces(pressure, points, shapes * np.outer(of_x, of_y).reshape(-1, 1))
@@ -58,10 +57,8 @@ def plate_lines(
     return frequencies, modal_motion(modes, frequencies, forces, modulus) @ outputs.T
 
 
-def _gauss(low: float, high: float, detail: float) -> tuple[Floats, Floats]:
-    """Gauss points and weights (k,) in m between two places, for a detail in m."""
+def _gauss(low: float, high: float, detail: float, spacing: float = 0.9) -> tuple[Floats, Floats]:
+    """Gauss points and weights (k,) in m between two places, at a `spacing` over a detail in m."""
     high = max(low, high)
-    spacing = 0.9  # of Gauss points, in standard deviations of the focal spot
-    spare = 8  # more Gauss points
-    count = int(np.ceil(np.pi / 2 * (high - low) / (spacing * detail))) + spare
+    count = int(np.ceil(np.pi / 2 * (high - low) / (spacing * detail))) + 8
     return gauss_points(np.array([low, high]), [count])
