@@ -32,13 +32,16 @@ from scipy.fft import next_fast_len, rfft
 from scipy.special import erfc
 
 from simple_model.layers.compliance import Compliance
-from simple_model.layers.wavenumber_integral import (
-    Field,
-    normal_field,
-    point_integrals,
-)
+from simple_model.layers.wavenumber_integral import Field, normal_field, point_integrals
 from simple_model.load.focus import GaussianSum, gaussian_sum
-from simple_model.load.path_cells import cells, jump_times, path_fourier, path_samples, sampled_load
+from simple_model.load.path_cells import (
+    AT_ONCE,
+    cells,
+    jump_times,
+    path_fourier,
+    path_samples,
+    sampled_load,
+)
 from simple_model.load.pressure import MovingPressure, check_lines
 from simple_model.load.sampling import (
     below_half_the_rate,
@@ -53,12 +56,9 @@ from simple_model.typing import Complex, Floats, Ints
 
 WRAP_AROUND = 1e-5  # factor by which the wrap-around is damped
 TRANSFORM_RATE = 20_000.0  # Hz, of the samples of the transform
-AT_ONCE = 2**22  # values transformed at a time, about 100 MB
 STEPS_PER_WIDTH = 6  # distances of a spline per standard deviation of the focal spot
-SAMPLE_OFFSETS = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # without symmetry
 
 Splines = Callable[[Floats], Floats]
-NORMAL = normal_field(Compliance(lambda k, w: 0 * k))  # its weights suit every body
 
 
 def steady_lines(
@@ -160,7 +160,8 @@ def path_operator(
     pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> Callable[[Compliance], tuple[Floats, Complex]]:
     """Return the function from the compliance of a body to its `steady_lines` under a load."""
-    path, blocks = _path(NORMAL, pressure, probes, threshold)
+    any_body = normal_field(Compliance(lambda k, w: 0 * k))  # its weights suit every body
+    path, blocks = _path(any_body, pressure, probes, threshold)
     harmonics = np.ascontiguousarray(np.concatenate(list(blocks), axis=-1))
 
     def lines_of(compliance: Compliance) -> tuple[Floats, Complex]:
@@ -239,36 +240,33 @@ def field_history(
     w = _transform_frequencies(padded, dt)
     damping = -w[0].imag
     folded = is_folded(pressure, times)
-    band_end = 3.0  # steepness of the error function that ends the band
     if not folded and oversampling(highest_line(pressure), step(times)) > 1:
         passed = below_half_the_rate(w.real / (2 * np.pi), times).astype(float)
     else:  # a spectrum that ended at once would ring after the start of an acceleration
-        passed = erfc(band_end * (4 * w.real * dt / np.pi - 3)) / 2
-
-    load_end = 6.0  # steepness of the error function that ends a load after the record
+        passed = erfc(3 * (4 * w.real * dt / np.pi - 3)) / 2
 
     def lasting(t: Floats) -> Floats:
-        """Factor of the load at times (t,) in s, with the damping of the transform."""
+        """Factor (t,) of the load at times in s: it ends smoothly after the record, and has the
+        damping of the transform.
+        """
         after = (t - n * dt) / ((padded - n) * dt)
-        ended = erfc(load_end * (2 * after - 1)) / 2
+        ended = erfc(6 * (2 * after - 1)) / 2
         return np.asarray(np.where(t < 0, 0.0, ended * np.exp(-damping * t)))
 
-    jumps = jump_times(pressure, 0.0, padded * dt)
-    parts = oversampling(highest_line(pressure), dt)
-    abrupt_parts = 2  # samples of a load that jumps, or turns, per sample of the transform
+    parts = 1
     if folded:
         knots, of_load = _low_passed_load(pressure, 0.5 / step(times), padded, dt, lasting)
-        parts = 1
     else:
-        turns = len(pressure.tacton.trajectory.parts[1]) > 1
-        parts = max(parts, abrupt_parts if len(jumps) or turns else 1)
+        jumps = jump_times(pressure, 0.0, padded * dt)
+        is_abrupt = len(jumps) or len(pressure.tacton.trajectory.parts[1]) > 1
+        parts = max(oversampling(highest_line(pressure), dt), 2 if is_abrupt else 1)
         knots, of_load = _sampled_load(pressure, jumps, padded, dt, parts, lasting)
     table, splines = _interpolation(probes, knots, spot)
     g = _transient(field, tuple(table.tolist()), padded, dt, spot.width)
-    u = np.zeros((len(w), len(probes), len(field.weights(SAMPLE_OFFSETS))), np.complex128)
+    u = np.zeros((len(w), len(probes), len(field.uses)), np.complex128)
     for i, probe in enumerate(probes):
         weighted = weighted_splines(field, splines, spot, probe - knots)
-        for m, c in np.argwhere(field.weights(SAMPLE_OFFSETS).any(axis=-1)):
+        for m, c in np.argwhere(field.uses):
             blocks = min(len(table), len(table) * padded * parts // AT_ONCE + 1)
             for some in np.array_split(np.arange(len(table)), blocks):
                 x = of_load(weighted[m, c, some].T)
@@ -287,13 +285,13 @@ def _transform_frequencies(padded: int, dt: float) -> Complex:
 
 @lru_cache(maxsize=4)
 def _transient(
-    field: Field, distances: tuple[float, ...], padded: int, dt: float, width: float
-) -> Complex:
+    field: Field, distances: tuple[float, ...], padded: int, dt: float, width: float,
+    negligible: float = 1e-4,
+) -> Complex:  # fmt: skip
     """Integrals (c, f, r) of a transient, up to the last frequency where they are not negligible.
     They depend on the body, not on the Tacton, so that all loads of a sweep share them.
     """
     w = _transform_frequencies(padded, dt)
-    negligible = 1e-4  # of the largest response, where the frequencies of a transient end
     g = point_integrals(field, np.array(distances), w, width, negligible=negligible)
     used = 1 + int(np.flatnonzero(g.any(axis=(0, 2))).max(initial=0))
     g = g[:, :used].copy()
@@ -304,10 +302,8 @@ def _transient(
 def transform_samples(times: Floats) -> tuple[int, int]:
     """Samples of the transform from one of the times (t,) in s to the next, and in all."""
     within = max(1, int(np.ceil(step(times) * TRANSFORM_RATE - 1e-6)))
-    padding = 2, 256  # samples of the transform for each sample of the record, and more
-    return within, next_fast_len(
-        padding[0] * ((len(times) - 1) * within + 1) + padding[1], real=True
-    )
+    padded = 2 * ((len(times) - 1) * within + 1) + 256
+    return within, next_fast_len(padded, real=True)
 
 
 def _sampled_load(
@@ -364,19 +360,21 @@ def _gaussians(pressure: MovingPressure) -> GaussianSum:
     return spot
 
 
-def spline_steps(furthest: float) -> int:
-    """Number of distances of a spline up to a distance in standard deviations of the focal spot."""
-    shared_steps = 8  # the steps of a spline are a multiple, so that loads share their integrals
-    return shared_steps * max(1, int(np.ceil(furthest * STEPS_PER_WIDTH / shared_steps))) + 1
+def spline_steps(furthest: float, multiple: int = 8) -> int:
+    """Number of distances of a spline up to a distance in standard deviations of the focal spot.
+    Its steps are a `multiple`, so that loads share their integrals.
+    """
+    return multiple * max(1, int(np.ceil(furthest * STEPS_PER_WIDTH / multiple))) + 1
 
 
-def _interpolation(probes: Floats, knots: Floats, spot: GaussianSum) -> tuple[Floats, Splines]:
+def _interpolation(
+    probes: Floats, knots: Floats, spot: GaussianSum, few: int = 40
+) -> tuple[Floats, Splines]:
     """Distances (j,) in m of the integrals, and the function from distances (...) to the shares
-    (..., j) that interpolate between them: cubic splines, flat at 0; few distances are used
+    (..., j) that interpolate between them: cubic splines, flat at 0. A `few` distances are used
     directly.
     """
-    few_distances = 40  # largest number that is computed without splines
-    if len(knots) * len(probes) * len(spot.shares) <= few_distances:
+    if len(knots) * len(probes) * len(spot.shares) <= few:
         away = (probes[:, None] - knots)[:, :, None] - spot.offsets
         unique: Floats = np.unique(np.linalg.norm(away, axis=-1))
         return unique, lambda r: (r[..., None] == unique).astype(float)

@@ -28,14 +28,12 @@ from numpy.typing import ArrayLike
 from scipy.special import jv
 
 from simple_model.layers.compliance import Compliance
-from simple_model.typing import Complex, Floats
+from simple_model.typing import Bools, Complex, Floats
 
 INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
 FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
 AT_ONCE = 2**12  # pairs of frequency and wavenumber, so that arrays stay in cache
 UNRESOLVED = "the wavenumber integral does not converge; add loss, or give a free slab a base"
-BATCH = 256  # frequencies at a time
-FEWEST_INTERVALS = 8  # between the first Chebyshev points of a batch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +53,12 @@ class Field:
     orders: tuple[int, ...]
     clearance: Callable[[Complex], float]
     weights: Callable[[Floats], Floats]
+
+    @property
+    def uses(self) -> Bools:
+        """Whether each component uses each integral (m, c)."""
+        without_symmetry = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])
+        return np.asarray(self.weights(without_symmetry).any(axis=-1))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,16 +99,10 @@ def point_integrals(
 ) -> Complex:
     """Compute the integrals (c, f, r) of a field about a Gaussian focal spot of 1 Pa.
 
-    Parameters
-    ----------
-    field : Field
-    distances : (r,) float, m
-    frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
-    width : m, standard deviation of the spot
-    negligible : integration over ascending frequencies ends after the batch in which each integral
-        is below this fraction of its largest value
-
-    Raises an ArithmeticError if the wavenumber grid cannot be made fine enough.
+    They are those at distances (r,) in m from a spot of standard deviation `width` in m, and at
+    real or complex frequencies (f,) in rad/s with imaginary part <= 0. Integration over ascending
+    frequencies ends after the batch in which each integral is below the fraction `negligible` of
+    its largest value. Raises an ArithmeticError if the wavenumber grid cannot be made fine enough.
     """
     r = np.atleast_1d(np.asarray(distances, np.float64))
     w = np.atleast_1d(np.asarray(frequencies, np.complex128))
@@ -112,10 +110,10 @@ def point_integrals(
 
     grid = partial(_grid, field.orders, tuple(r.tolist()), width)
     n, before = FEWEST_NODES, 0.0
-    check_interval = 8  # batches between two checks of the grid
+    check_interval = 2048  # frequencies between two checks of the grid
     for part in _batches(w):
         lift = _lift(field, r, w[part], width)
-        if lift != before or part.start % (check_interval * BATCH) == 0:
+        if lift != before or part.start % check_interval == 0:
             least = n if lift == before else FEWEST_NODES
             n, integrals[:, part] = _resolve(field, w[part], partial(grid, lift), least)
         else:
@@ -127,11 +125,11 @@ def point_integrals(
     return integrals
 
 
-def _batches(w: Complex) -> Iterator[slice]:
+def _batches(w: Complex, first: int = 64, constant: int = 256) -> Iterator[slice]:
+    """Batches of frequencies: those of a transient are as long as all before, others `constant`."""
     start = 0
-    first_batch = 64  # frequencies of a transient; later batches are as long as all before
     while start < len(w):
-        stop = start + (max(first_batch, start) if _is_damped(w) else BATCH)
+        stop = start + (max(first, start) if _is_damped(w) else constant)
         yield slice(start, stop)
         start = stop
 
@@ -159,29 +157,28 @@ def _resolve(field: Field, w: Complex, grid: Callable[[int], _Grid], n: int) -> 
     raise ArithmeticError(UNRESOLVED)
 
 
-def _batch(field: Field, w: Complex, grid: _Grid) -> Complex:
-    """Integrals (c, f, r) at the frequencies of a batch, interpolated if they are smooth."""
-    integrals = _interpolate(field, w, grid) if _is_damped(w) else None
-    return _integrate(field, w, grid) if integrals is None else integrals
-
-
 def _is_damped(w: Complex) -> bool:
     """Whether there are many frequencies on a line below the real axis, as for a transient."""
-    return bool(len(w) > 4 * FEWEST_INTERVALS and w.imag.max() < 0 and np.ptp(w.imag) == 0)
+    return bool(len(w) > 32 and w.imag.max() < 0 and np.ptp(w.imag) == 0)
 
 
-def _interpolate(field: Field, w: Complex, grid: _Grid) -> Complex | None:
-    """Integrals (c, f, r) at frequencies on a line, by a polynomial; None if that takes more than
-    half as many evaluations.
+def _batch(
+    field: Field, w: Complex, grid: _Grid, n: int = 8, interpolation_error: float = 1e-7
+) -> Complex:
+    """Integrals (c, f, r) at the frequencies of a batch.
+
+    On a line below the real axis they are interpolated by a polynomial, from `n` intervals on,
+    unless that takes more than half as many evaluations. The relative error is small, so that weak
+    lines are accurate too.
     """
+    if not _is_damped(w):
+        return _integrate(field, w, grid)
     middle, half = (w.real.max() + w.real.min()) / 2, np.ptp(w.real) / 2
 
     def at(x: Floats) -> Complex:
         return _integrate(field, middle + half * x + 1j * w.imag[0], grid)
 
-    n, error = FEWEST_INTERVALS, np.nan
-    values = at(_chebyshev(n))
-    interpolation_error = 1e-7  # relative, so that weak lines are accurate too
+    values, error = at(_chebyshev(n)), np.nan
     while 4 * n <= len(w):
         between = _chebyshev(2 * n)[1::2]
         finer = np.repeat(values, 2, axis=1)[:, :-1]
@@ -193,8 +190,8 @@ def _interpolate(field: Field, w: Complex, grid: _Grid) -> Complex | None:
         if np.fmin(error, predicted) <= interpolation_error:
             return _through(values, (w.real - middle) / half)
         if error ** (len(w) / n) > interpolation_error**0.5:  # at the largest number allowed
-            return None
-    return None
+            break
+    return _integrate(field, w, grid)
 
 
 def _chebyshev(n: int) -> Floats:

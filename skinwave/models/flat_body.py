@@ -11,8 +11,6 @@ import simple_model
 from simple_model import Effort, ErrorPart, Response
 from simple_model.layers.compliance import thick_plate
 from simple_model.layers.flat_body import (
-    AT_ONCE,
-    SAMPLE_OFFSETS,
     TRANSFORM_RATE,
     WRAP_AROUND,
     field_history,
@@ -24,7 +22,7 @@ from simple_model.layers.flat_body import (
 from simple_model.layers.flat_quantities import quantity_field, surface_field, traction_field
 from simple_model.layers.wavenumber_integral import FEWEST_NODES, MOST_NODES, Field
 from simple_model.load.focus import gaussian_sum
-from simple_model.load.path_cells import is_abrupt, path_samples
+from simple_model.load.path_cells import AT_ONCE, is_abrupt, path_samples
 from simple_model.load.sampling import highest_line, is_folded, oversampling
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies import sheet
@@ -204,7 +202,7 @@ def _integrals(scene: Scene) -> tuple[int, int, float, float]:
     body, depths = scene.body, sorted(set(scene.depths))
     layers = sum(isfinite(each) for each in thicknesses(body.strata)) + isfinite(body.depth)
     fields = [each for depth in depths for each in fields_read(scene, depth)]
-    terms = sum(int(np.count_nonzero(each.weights(SAMPLE_OFFSETS).any(axis=-1))) for each in fields)
+    terms = sum(int(np.count_nonzero(each.uses)) for each in fields)
     omega = 2 * pi * LOSS_AT
     moduli = [solid.complex_modulus(omega) for _, solid in body.strata]
     loss = max(float(each.imag / each.real) for each in moduli) if isfinite(body.depth) else 1.0
