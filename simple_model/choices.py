@@ -4,8 +4,7 @@ import difflib
 from collections.abc import Iterable
 from math import isfinite
 
-LEAST_SIMILARITY = 0.6  # ratio of difflib: 2 x letters in common over all letters
-SHORTEST_PART, LONGEST_WORD = 3, 60  # letters of a part that matches, and letters compared
+SHORTEST_PART = 3  # letters of a part of a word that suggests the whole word
 
 
 def choose(kind: str, value: str, known: Iterable[str]) -> str:
@@ -24,15 +23,16 @@ def suggestion(value: object, known: Iterable[str]) -> str:
     return f"; did you mean '{near}'?" if near else ""
 
 
-def nearest(value: object, known: Iterable[str]) -> str:
-    """Return the known word nearest to another one, or "" if none is near. A word without its last
-    parts, such as a key without its unit, is nearest to the shortest whole word.
+def nearest(value: object, known: Iterable[str], *, longest: int = 60) -> str:
+    """Return the known word nearest to the first `longest` letters of another one, or "" if none is
+    near. A word without its last parts, such as a key without its unit, is nearest to the shortest
+    whole word.
     """
-    words, given = {word.lower(): word for word in known}, str(value)[:LONGEST_WORD].lower()
+    words, given = {word.lower(): word for word in known}, str(value)[:longest].lower()
     near = sorted(
         (word for word in words if word.startswith(f"{given}_")), key=lambda word: word.count("_")
     )
-    near = near or difflib.get_close_matches(given, words, 1, LEAST_SIMILARITY)
+    near = near or difflib.get_close_matches(given, words, 1, cutoff=0.6)
     if not near and len(given) >= SHORTEST_PART:
         near = [word for word in words if given in word]
     return words[near[0]] if near else ""

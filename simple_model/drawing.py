@@ -17,13 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_NAMED = 8  # curves that a legend names, the outermost among them
-LEGEND_TITLE = "probes at (x, y) in mm"
-ENTRY_WIDTH = 0.105  # inch of a legend entry per point of font size
-DPI = 100  # of a figure on a page
-SMALLER, SMALLEST = 5 / 6, 8.0  # ratio to the font size of axes; points, of any text
-CELL = "padding:0.1em 0.8em 0.1em 0;text-align:left;vertical-align:top"
-
 
 def new_axes(ax: "Axes | None") -> "Axes":
     """Return the given axes, or those of a new pyplot figure."""
@@ -38,7 +31,7 @@ def small() -> float:
     """Font size in points of text smaller than the labels of axes."""
     import matplotlib as mpl
 
-    return max(SMALLER * float(mpl.rcParams["font.size"]), SMALLEST)
+    return max(5 / 6 * float(mpl.rcParams["font.size"]), 8.0)
 
 
 def place_name(place: Floats) -> str:
@@ -46,23 +39,26 @@ def place_name(place: Floats) -> str:
     return f"({', '.join(f'{1e3 * x:.4g}' for x in place)})"
 
 
-def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) -> None:
+def curves(
+    ax: "Axes", x: Floats, values: Floats, places: Floats, *, most_named: int = 8, **style: Any
+) -> None:
     """Draw values (k, p) over x (k,), one curve for each probe at places (p, 2) in m, from dark to
-    bright. The legend has at most `MOST_NAMED` entries.
+    bright. The legend names `most_named` of them, the outermost among them.
     """
     import matplotlib as mpl
 
     count = values.shape[1]
     colours = mpl.colormaps["viridis"](np.linspace(0, 0.88, count))
-    named = set(np.linspace(0, count - 1, min(count, MOST_NAMED)).round().astype(int).tolist())
+    named = set(np.linspace(0, count - 1, min(count, most_named)).round().astype(int).tolist())
     for k in range(count):
         label = place_name(places[k]) if k in named else None
         ax.plot(x, values[:, k], color=colours[k], label=label, **{"lw": 1.2, **style})
     inch = ax.get_window_extent().width / ax.figure.get_dpi()
-    columns = max(1, min(len(named), int(inch / (ENTRY_WIDTH * mpl.rcParams["font.size"]))))
+    entry = 0.105 * mpl.rcParams["font.size"]  # inch
+    columns = max(1, min(len(named), int(inch / entry)))
     ax.legend(
         loc="lower left", bbox_to_anchor=(0, 1), ncols=columns, frameon=False,
-        title=LEGEND_TITLE, alignment="left", fontsize=small(), borderaxespad=0.2,
+        title="probes at (x, y) in mm", alignment="left", fontsize=small(), borderaxespad=0.2,
         columnspacing=1.0, handlelength=1.2,
     )  # fmt: skip
     ax.grid(alpha=0.25)
@@ -77,15 +73,16 @@ def picture(draw: Callable[["Figure"], object], width: float, height: float) -> 
     with mpl.rc_context({"font.size": 8}):
         figure = Figure(figsize=(width, height), layout="constrained")
         draw(figure)
-        figure.savefig(buffer, format="png", dpi=DPI)
+        figure.savefig(buffer, format="png", dpi=100)
     return buffer.getvalue()
 
 
 def table(rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
     """Format rows as an HTML table, every cell as text."""
+    style = "padding:0.1em 0.8em 0.1em 0;text-align:left;vertical-align:top"
 
     def line(cells: Sequence[str], kind: str) -> str:
-        return "".join(f'<{kind} style="{CELL}">{escape(cell)}</{kind}>' for cell in cells)
+        return "".join(f'<{kind} style="{style}">{escape(cell)}</{kind}>' for cell in cells)
 
     head = f"<tr>{line(header, 'th')}</tr>" if header else ""
     body = "".join(f"<tr>{line(row, 'td')}</tr>" for row in rows)

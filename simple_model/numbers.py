@@ -6,8 +6,6 @@
 
 from math import floor, isfinite, log10
 
-LARGEST, SMALLEST = 1e6, 1e-4  # numbers between these have no exponent
-LEAST = 0.005  # smallest stated error: wavenumber integrals and elements agree to 0.002
 EN_DASH = "\u2013"
 FAINTEST = -120.0  # dB: a level below it is round-off
 
@@ -20,7 +18,7 @@ def significant(value: float, digits: int = 3) -> str:
     """
     if not isfinite(value):
         return "-"
-    if not SMALLEST <= abs(value) < LARGEST:
+    if not 1e-4 <= abs(value) < 1e6:
         return f"{value:.{digits}g}"
     value = float(f"{value:.{digits - 1}e}")
     return f"{value:,.{max(digits - 1 - floor(log10(abs(value))), 0)}f}"
@@ -90,8 +88,10 @@ def plural(number: int, thing: str) -> str:
     return f"{number:,} {thing}{'s' * (number != 1)}"
 
 
-def stated_error(error: float) -> str:
-    """Format an expected relative error; those below `LEAST` are given as a bound."""
+def stated_error(error: float, least: float = 0.005) -> str:
+    """Format an expected relative error. Those below `least` are given as a bound, because
+    wavenumber integrals and elements agree to 0.002.
+    """
     if not isfinite(error):
         return "not known"
-    return f"below {percent(LEAST)}" if error < LEAST else percent(error)
+    return f"below {percent(least)}" if error < least else percent(error)

@@ -14,11 +14,7 @@ from simple_model.typing import Complex, Floats
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DEEPEST, LOUD = 1e-4, 1e-3  # of the largest amplitude: axis limit; sets the frequency range
-MOST_PRINTED = 5  # names of lines
-NAMES_ABREAST = 28  # that fit along the frequency axis
-NONE_RESOLVED = "no line of the load is resolved;\na longer Tacton resolves more"
-
+LOUD = 1e-3  # of the largest amplitude: louder ones set the frequency range
 # Weights of cosines (Harris 1978, doi:10.1109/PROC.1978.10837).
 COSINES = {
     "boxcar": (1.0,),
@@ -54,9 +50,9 @@ class Spectrum:
         ax = new_axes(ax)
         scaled = self.record.per_unit * self.amplitudes
         largest = float(scaled.max(initial=0.0)) or 1.0
-        curves(ax, self.frequencies, np.maximum(scaled, 1e-3 * DEEPEST * largest), self.probes)
+        curves(ax, self.frequencies, np.maximum(scaled, 1e-7 * largest), self.probes)
         _scale(ax, self.frequencies, scaled, self.record)
-        ax.set_ylim(DEEPEST * largest, 3 * largest)
+        ax.set_ylim(1e-4 * largest, 3 * largest)
         return ax
 
 
@@ -93,7 +89,7 @@ class Lines:
 
     def __repr__(self) -> str:
         strongest = np.argsort(-np.abs(self.amplitudes).max(axis=1, initial=0.0), kind="stable")
-        named = ", ".join(self.names[k] for k in strongest[:MOST_PRINTED])
+        named = ", ".join(self.names[k] for k in strongest[:5])
         strong = f"; the strongest: {named}" if named else ""
         counts = f"{plural(len(self), 'line')}, {plural(len(self.probes), 'probe')}"
         return f"<Lines of {self.record.words}: {counts}{strong}>"
@@ -109,7 +105,7 @@ class Lines:
         heights = size.max(axis=1, initial=0.0)
         chosen = list[int]()  # none is near a stronger one
         for k in np.argsort(-heights, kind="stable").tolist():
-            apart = np.abs(self.frequencies[k] - self.frequencies[chosen]) > end / NAMES_ABREAST
+            apart = np.abs(self.frequencies[k] - self.frequencies[chosen]) > end / 28  # a name fits
             if heights[k] > LOUD * largest and apart.all():
                 chosen.append(k)
                 ax.annotate(
@@ -118,7 +114,8 @@ class Lines:
                     parse_math=False,
                 )  # fmt: skip
         if not len(self):
-            ax.text(0.5, 0.5, NONE_RESOLVED, transform=ax.transAxes, ha="center", va="center")
+            words = "no line of the load is resolved;\na longer Tacton resolves more"
+            ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center")
         return ax
 
 

@@ -9,8 +9,6 @@ from typing import Any
 
 from simple_model.numbers import change_text, percent, stated_error
 
-NEGLIGIBLE = 0.01  # of the total error: smaller parts are not in the words
-
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorPart:
@@ -71,11 +69,9 @@ class Statement:
 
     @property
     def words(self) -> str:
-        """The parts, the largest first, and their total."""
+        """The parts above 1 % of the total, the largest first, and their total."""
         error = self.error
-        if not isfinite(error):
-            return stated_error(error)
-        shown = [part for part in self.parts if part.error > NEGLIGIBLE * error]
+        shown = [part for part in self.parts if part.error > 0.01 * error]
         each = ", ".join(f"{part.name} {percent(part.error)}" for part in shown)
         return f"{each}; together {stated_error(error)}" if shown else stated_error(error)
 

@@ -26,11 +26,6 @@ from simple_model.typing import Floats
 BAND = 5.0  # dB, between people and between laboratories
 LOWEST, HIGHEST = 10.0, 1000.0  # Hz
 AREAS = {"focal_spot": 7.0, "large_contactor": 0.0}  # dB, added in the Pacinian channel
-# Detection threshold in Pa at the focus with AM at 200 Hz: the radiation pressure 2 p^2 / (rho c^2)
-# of 556.9 Pa of sound pressure (Howard et al., IEEE World Haptics 2019, as quoted by Lim, Park and
-# Seifi, CHI 2024, arXiv 2405.02800; whether rms or peak is not stated).
-MEASURED_PRESSURE = 4.4
-MEASURED_FREQUENCY = 200.0  # Hz
 
 
 def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
@@ -54,11 +49,13 @@ def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
 def pressure_threshold(frequency: ArrayLike) -> Floats:
     """Return the detection threshold (...) in Pa of a component of the pressure at a focus on skin.
 
-    `MEASURED_PRESSURE` is for AM at 200 Hz, whose component at 200 Hz is half of it. Other
-    frequencies (...) in Hz follow the displacement threshold, as if compliance did not depend on
-    frequency.
+    With AM at 200 Hz it is 4.4 Pa at the focus, the radiation pressure 2 p^2 / (rho c^2) of 556.9
+    Pa of sound pressure (Howard et al., IEEE World Haptics 2019, as quoted by Lim, Park and Seifi,
+    CHI 2024, arXiv 2405.02800; whether rms or peak is not stated). The component at 200 Hz is half
+    of it. Other frequencies (...) in Hz follow the displacement threshold, as if compliance did not
+    depend on frequency.
     """
-    return np.asarray(MEASURED_PRESSURE / 2 * threshold(frequency) / threshold(MEASURED_FREQUENCY))
+    return np.asarray(4.4 / 2 * threshold(frequency) / threshold(200.0))
 
 
 def sensation_level(

@@ -26,25 +26,11 @@ if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
 
 SPEED_OF_SOUND = 343.0  # m/s
-WAVENUMBER = 2 * np.pi * 40e3 / SPEED_OF_SOUND
-PITCH, PISTON_RADIUS, PER_SIDE = 10.3e-3, 4.5e-3, 16  # m, m
-PRESSURE_AT_1M = 3.4  # Pa, amplitude per element on its axis
-ABSORPTION = 1.32 / (20 * np.log10(np.e))  # 1/m: 1.32 dB/m at 20 C and 50 % humidity, ISO 9613-1
 GAUSSIAN_WIDTH = 4.35e-3  # m at 200 mm: the half width of sinc^2, and the force out to 20 mm
-HALF_DEPTH = 37e-3  # m at 200 mm, above and below the focus, to half its intensity
 NOMINAL_HEIGHT = 0.200  # m
 FOCI = ("gaussian", "main_lobe", "array")
-CONTACT_WIDTHS = (0.2e-3, 20e-3)  # m, standard deviations of a `ContactSpot`
 REACH = 5.7  # standard deviations at which a Gaussian is 1e-7
 FocalSpot = Callable[[Floats], Floats]  # offsets (..., 2) in m from the focus -> relative (...)
-
-# Force of `array_field` on a disc of radius 10 mm about the focus, relative to 200 mm. A balance
-# measures this force, and only this force has its maximum at 200 mm.
-_HEIGHTS = np.array([20, 40, 60, 80, 100, 120, 150, 180, 200, 220, 250, 300, 350, 400, 500, 600])
-_FORCES = np.array(
-    [0.2395, 0.4048, 0.5717, 0.6989, 0.7850, 0.8502, 0.9319, 0.9860]
-    + [1.0, 0.9963, 0.9634, 0.8655, 0.7505, 0.6411, 0.4644, 0.3414]
-)
 
 
 def _one_gaussian(width: float) -> GaussianSum:
@@ -55,15 +41,14 @@ def _one_gaussian(width: float) -> GaussianSum:
 class ContactSpot:
     """Gaussian traction of a small contact of standard deviation `width` in m.
 
-    It does not depend on the height. A width outside `CONTACT_WIDTHS` raises a ValueError.
+    It does not depend on the height. A width outside 0.2 to 20 mm raises a ValueError.
     """
 
     width: float
 
     def __post_init__(self) -> None:
-        low, high = CONTACT_WIDTHS
         cure = "; a point contact has no finite response, give the size of the contact"
-        check_range("width of a contact", 1e3 * self.width, 1e3 * low, 1e3 * high, " mm", cure)
+        check_range("width of a contact", 1e3 * self.width, 0.2, 20, " mm", cure)
 
     @property
     def spacing(self) -> float:
@@ -90,16 +75,20 @@ def array_field(points: ArrayLike, focus: ArrayLike) -> Complex:
 
     The array is centred at the origin in the plane z = 0 and radiates upwards.
     """
-    line = (np.arange(PER_SIDE) - (PER_SIDE - 1) / 2) * PITCH
+    pitch, radius, per_side = 10.3e-3, 4.5e-3, 16  # m, m
+    pressure_at_1m = 3.4  # Pa, amplitude per element on its axis
+    absorption = 1.32 / (20 * np.log10(np.e))  # 1.32 dB/m at 20 C and 50 % humidity, ISO 9613-1
+    wavenumber = 2 * np.pi * 40e3 / SPEED_OF_SOUND
+    line = (np.arange(per_side) - (per_side - 1) / 2) * pitch
     elements = np.stack(np.meshgrid(line, line, [0.0]), axis=-1).reshape(-1, 3)
     rays = np.atleast_2d(np.asarray(points, np.float64))[:, None] - elements
     distance = np.linalg.norm(rays, axis=2)
-    argument = WAVENUMBER * PISTON_RADIUS * np.hypot(rays[..., 0], rays[..., 1]) / distance
+    argument = wavenumber * radius * np.hypot(rays[..., 0], rays[..., 1]) / distance
     directivity = np.ones_like(argument)
     np.divide(2 * j1(argument), argument, out=directivity, where=argument > 1e-9)
     delay = np.linalg.norm(np.asarray(focus, np.float64) - elements, axis=1)
-    wave = np.exp(1j * WAVENUMBER * (distance - delay) - ABSORPTION * distance)
-    return (PRESSURE_AT_1M / distance * directivity * wave).sum(axis=1)
+    wave = np.exp(1j * wavenumber * (distance - delay) - absorption * distance)
+    return (pressure_at_1m / distance * directivity * wave).sum(axis=1)
 
 
 @lru_cache(maxsize=64)  # every pressure of a load needs it
@@ -108,13 +97,19 @@ def relative_intensity(height: float) -> float:
 
     Raises a ValueError if the height is outside 20 to 600 mm.
     """
-    low, high = _HEIGHTS[[0, -1]].tolist()
-    check_range("height", 1e3 * height, low, high, " mm", ", where the array focuses")
+    heights = [20, 40, 60, 80, 100, 120, 150, 180, 200, 220, 250, 300, 350, 400, 500, 600]  # mm
+    # Force of `array_field` on a disc of radius 10 mm about the focus, relative to 200 mm. A
+    # balance measures this force, and only this force has its maximum at 200 mm.
+    forces = [
+        0.2395, 0.4048, 0.5717, 0.6989, 0.7850, 0.8502, 0.9319, 0.9860,
+        1.0, 0.9963, 0.9634, 0.8655, 0.7505, 0.6411, 0.4644, 0.3414,
+    ]  # fmt: skip
+    check_range("height", 1e3 * height, heights[0], heights[-1], " mm", ", where the array focuses")
     if height == NOMINAL_HEIGHT:
         return 1.0
     from scipy.interpolate import PchipInterpolator  # slow to import
 
-    return float(PchipInterpolator(_HEIGHTS, _FORCES)(1e3 * height))
+    return float(PchipInterpolator(heights, forces)(1e3 * height))
 
 
 def lobe_width(height: float) -> float:
@@ -195,7 +190,7 @@ def along_axis(offset: ArrayLike, width: float = GAUSSIAN_WIDTH) -> Floats:
     A Gaussian whose half width is proportional to the square of that of the focal spot, here as
     the standard deviation `width` in m. It is within 4 % of `array_field`.
     """
-    half_width = HALF_DEPTH * (width / GAUSSIAN_WIDTH) ** 2
+    half_width = 37e-3 * (width / GAUSSIAN_WIDTH) ** 2  # m
     return np.exp(-np.log(2) * (np.asarray(offset, np.float64) / half_width) ** 2)
 
 

@@ -27,20 +27,14 @@ from simple_model.load.spectrum import (
     path_strengths,
     unbounded_harmonics_error,
 )
-from simple_model.load.tacton import Tacton, tones
+from simple_model.load.tacton import Tacton, repetition_frequencies
 from simple_model.typing import Complex, Floats, Ints
 
 SYMBOLS = ("f_d", "f_AM", "f_AM2", "f_e", "f_s", "f_r")
 WEAKEST = 1e-3  # of the strongest line: -60 dB
 MOST = 200  # lines
 SAME_LINE = 1e-3  # over the duration: closer lines in Hz coincide
-FEWEST_PERIODS = 1.5  # of a recording in a Tacton, for a line of its own
 FEWEST_CYCLES = 4 / 3  # of a rhythm or signal: one remains after a quarter of the Tacton
-PERIOD_SAMPLES = 2**14  # of a rhythm or signal
-ROUND_OFF = 1e-10  # of the strongest harmonic of the path, its mean
-MOST_HARMONICS = 400  # of a path
-MOST_PRODUCTS = 4000  # orders of the gain
-DEGREES = (4, 8, 16, 32)  # of polynomials fitted to other drive laws
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,18 +142,14 @@ def line_frequency(tacton: Tacton, name: str) -> float | None:
 
 def symbols(tacton: Tacton) -> Floats:
     """Frequencies (6,) in Hz of `SYMBOLS`; 0 for those that a Tacton does not have or repeat."""
-    w1, w2 = tacton.superposition
-    f_1, f_2, f_e = tones(tacton)
-    signal, rhythm = tacton.signal, tacton.rhythm
-    f_d = tacton.drawing_frequency
-    once = tacton.trajectory.shape == "recorded" and f_d * tacton.duration < FEWEST_PERIODS
-    slow = (
-        signal.rate / len(signal.samples) if signal else 0.0,
-        1 / rhythm.period if rhythm else 0.0,
-    )
-    fewest = FEWEST_CYCLES * (1 - SAME_LINE)
-    repeated = [f if f * tacton.duration >= fewest else 0.0 for f in slow]
-    return np.array([0.0 if once else f_d, f_1 * (w1 > 0), f_2 * (w2 > 0), f_e, *repeated])
+    f_d, known = tacton.drawing_frequency, repetition_frequencies(tacton)
+    # A line of its own takes 1.5 periods of a recording.
+    once = tacton.trajectory.shape == "recorded" and f_d * tacton.duration < 1.5
+    known["f_d"] = 0.0 if once else f_d
+    for name in ("f_s", "f_r"):
+        if known.get(name, 0.0) * tacton.duration < FEWEST_CYCLES * (1 - SAME_LINE):
+            known[name] = 0.0
+    return np.array([known.get(name, 0.0) for name in SYMBOLS])
 
 
 def line_name(orders: Sequence[int], of_tacton: Floats) -> str:
@@ -202,7 +192,7 @@ def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floa
             rhythm=None, signal=None,
         )  # fmt: skip
         path = replace(path, tacton=still)
-    n, share = path_strengths(path, ROUND_OFF)
+    n, share = path_strengths(path, 1e-10)
     share = share * np.abs(foci_harmonics(path, n))
     if once:
         share /= max(float(np.abs(path.gain(0.0))), 1e-300)
@@ -213,7 +203,7 @@ def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floa
         n, share = n[whole] // tacton.n_paths, share[whole]
     else:
         n, share = n[n == 0], share[n == 0]
-    strongest = np.argsort(-share, kind="stable")[:MOST_HARMONICS]
+    strongest = np.argsort(-share, kind="stable")[:400]
     n, share = n[strongest], share[strongest]
     orders = np.column_stack([np.repeat(n, len(gain)), np.tile(gain, (len(n), 1))])
     strengths = 2 * (share[:, None] * c).ravel()
@@ -223,27 +213,26 @@ def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floa
     return orders[strong], strengths[strong]
 
 
-def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floats]:
-    """Orders (m, 5) of f_AM, f_AM2, f_e, f_s and f_r in the gain, and amplitudes (m,) in Pa."""
+def _gain_products(
+    pressure: MovingPressure, threshold: float, samples: int = 2**14
+) -> tuple[Ints, Floats]:
+    """Orders (m, 5) of f_AM, f_AM2, f_e, f_s and f_r in the gain, and amplitudes (m,) in Pa, by a
+    number of `samples` of the period of a rhythm or signal.
+    """
     tacton, of_tacton = pressure.tacton, symbols(pressure.tacton)
-    factor = pressure.law.level_factor
+    factor, depth = pressure.law.level_factor, pressure.depth_of_modulation
     of_signal, powers = np.ones((1, 1), np.complex128), np.ones(1, np.complex128)
-    coefficients, signal = None, tacton.signal
+    orders, coefficients = gain_orders(without_sampled_parts(pressure))
+    signal, rhythm = tacton.signal, tacton.rhythm
     if signal is not None and of_tacton[4]:
-        samples = max(PERIOD_SAMPLES, 2 * len(signal.samples))
-        values = signal.at((np.arange(samples) + 0.5) / samples * len(signal.samples) / signal.rate)
+        values = signal.at(_middles(max(samples, 2 * len(signal.samples))) / of_tacton[4])
         if signal.role == "envelope":
-            of_signal = _fourier(factor(values, pressure.depth_of_modulation))[None]
+            of_signal = _fourier(factor(values, depth))[None]
         else:
             orders, coefficients = _in_powers(pressure)
             of_signal = np.stack([_fourier(values**j) for j in range(len(coefficients))])
-    if coefficients is None:
-        orders, coefficients = gain_orders(without_sampled_parts(pressure))
-    if tacton.rhythm is not None and of_tacton[5]:
-        level = tacton.rhythm.level(
-            (np.arange(PERIOD_SAMPLES) + 0.5) / PERIOD_SAMPLES * tacton.rhythm.period
-        )
-        powers = _fourier(factor(level, pressure.depth_of_modulation))
+    if rhythm is not None and of_tacton[5]:
+        powers = _fourier(factor(rhythm.level(_middles(samples) * rhythm.period), depth))
     c = np.abs(np.einsum("jm,ju->mu", coefficients, of_signal))
     (m, u), c = _strongest(c, threshold)
     (k, v), c = _strongest(c[:, None] * np.abs(powers), threshold)
@@ -259,7 +248,7 @@ def _in_powers(pressure: MovingPressure) -> tuple[Ints, NDArray]:
     They interpolate at Chebyshev points and are checked between them.
     """
     law, plain = pressure.law, without_sampled_parts(pressure)
-    for degree in DEGREES if law.degree is None else (max(1, law.degree),):
+    for degree in (4, 8, 16, 32) if law.degree is None else (max(1, law.degree),):
         factors = np.cos(np.pi * np.arange(2 * degree + 1) / (2 * degree))
         powers = np.vander(factors, degree + 1, increasing=True)
         orders, at = gain_orders(plain, factors.tolist())
@@ -269,15 +258,19 @@ def _in_powers(pressure: MovingPressure) -> tuple[Ints, NDArray]:
     raise unbounded_harmonics_error(law)
 
 
+def _middles(count: int) -> Floats:
+    return np.asarray((np.arange(count) + 0.5) / count)
+
+
 def _fourier(values: Floats) -> Complex:
     return np.asarray(np.fft.fft(values) / len(values))
 
 
-def _strongest(c: Floats, threshold: float) -> tuple[tuple[Ints, Ints], Floats]:
-    """Indices and values (k,) of the entries above a fraction of the largest, limited in number."""
+def _strongest(c: Floats, threshold: float, most: int = 4000) -> tuple[tuple[Ints, Ints], Floats]:
+    """Indices and values (k,) of the entries above a fraction of the largest, about `most`."""
     least = threshold * c.max(initial=0.0)
-    if c.size > MOST_PRODUCTS:
-        least = max(least, np.partition(c.ravel(), -MOST_PRODUCTS)[-MOST_PRODUCTS])
+    if c.size > most:
+        least = max(least, np.partition(c.ravel(), -most)[-most])
     rows, columns = np.nonzero((c >= least) & (c > 0))
     return (rows, columns), c[rows, columns]
 

@@ -19,21 +19,15 @@ from math import lcm
 import numpy as np
 from scipy import fft, sparse
 
-from simple_model.load.focus import spot_detail
+from simple_model.load.focus import REACH, spot_detail
 from simple_model.load.pressure import MovingPressure
-from simple_model.load.tacton import Tacton, tones
-from simple_model.load.trajectory import LEAST_JUMP, Trajectory, differ
+from simple_model.load.tacton import tones
+from simple_model.load.trajectory import LEAST_JUMP, SAME_PHASE, Trajectory, differ
 from simple_model.typing import Complex, Floats, Ints
 
-FEWEST_KNOTS = 132  # positions along a closed path: harmonics below 66 f_d
-KNOTS_PER_WIDTH = 8  # of the focal spot: corners are accurate to 1e-4
-NODES_PER_WIDTH = 16  # of interpolation along the path, accurate to 1e-6
 HIGHEST = 10_000.0  # Hz: higher lines of jumps, pulses and recordings move bodies by 0.1 %
-PER_HIGHEST = 2.5  # samples per period of `HIGHEST`
-LEAST_RATE = 40_000.0  # Hz, of a rhythm or signal: periods in milliseconds are whole cells
-PASSING_LIMIT = 5.7 / (2 * np.pi)  # f s / v where the spectrum of a passing spot is 1e-7
-BRIEF = 0.01  # of the time of a recording, in which it may move faster
-ROUND_OFF = 1e-9  # of a cell or a period
+SAMPLE_RATE = 2.5 * HIGHEST  # Hz, of a load with jumps
+KNOTS_PER_WIDTH = 8  # of the focal spot: corners are accurate to 1e-4
 AT_ONCE = 2**22  # values transformed at a time, about 100 MB
 
 
@@ -85,7 +79,7 @@ def path_cells(pressure: MovingPressure) -> PathCells:
 def _ends_as_it_begins(pressure: MovingPressure) -> bool:
     """Whether the load repeats without a jump after the Tacton."""
     tacton = pressure.tacton
-    ends = tacton.duration * np.array([ROUND_OFF, 1 - ROUND_OFF])
+    ends = tacton.duration * np.array([SAME_PHASE, 1 - SAME_PHASE])
     begins, stops = pressure.gain(ends)
     path = tacton.trajectory
     each = [np.mod(path.phase(ends) + ahead, 1.0) for ahead in tacton.foci]
@@ -184,7 +178,7 @@ def jump_phases(pressure: MovingPressure) -> Floats:
         return np.union1d(path.jumps, path.turns)
     if path.shape != "recorded":
         return path.jumps
-    brief = np.diff(bounds) * path.times[-1] < 1 / (PER_HIGHEST * HIGHEST)
+    brief = np.diff(bounds) * path.times[-1] < 1 / SAMPLE_RATE
     brief &= lengths > spot_detail(pressure.height, pressure.profile) / 2
     return np.unique(np.mod(np.concatenate([path.jumps, bounds[:-1][brief], bounds[1:][brief]]), 1))
 
@@ -205,14 +199,17 @@ def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
     return times[(times >= start) & (times <= end)]
 
 
-def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats, sparse.csr_array]:
-    """Positions (q, 2) in m on a path, and the matrix (m, q) that interpolates to phases (m,).
+def along_path(
+    path: Trajectory, phases: Floats, detail: float, nodes_per_detail: float = 16
+) -> tuple[Floats, sparse.csr_array]:
+    """Positions (q, 2) in m on a path, and the matrix (m, q) that interpolates to phases (m,),
+    accurate to 1e-6.
 
     Cubics interpolate along each part of the path that has more phases than nodes.
     """
     bounds, lengths = path.parts
     part = np.clip(np.searchsorted(bounds, phases, side="right") - 1, 0, len(lengths) - 1)
-    nodes = np.ceil(NODES_PER_WIDTH * lengths / detail).astype(int) + 4
+    nodes = np.ceil(nodes_per_detail * lengths / detail).astype(int) + 4
     dense = (np.bincount(part, minlength=len(lengths)) > nodes) & (lengths > 0)
     own = np.flatnonzero(~dense[part])
     positions, q = [path.at_phase(phases[own])], len(own)
@@ -244,12 +241,8 @@ def is_abrupt(pressure: MovingPressure) -> bool:
     """
     tacton, jumps = pressure.tacton, jump_phases(pressure)
     n, path = tacton.n_paths, tacton.trajectory
-    within = jumps * n - np.round(jumps * n)
-    if (
-        path.levels
-        or (np.abs(within) > ROUND_OFF).any()
-        or (len(jumps) and (n == 1 or pressure.heading))
-    ):
+    within = np.abs(jumps * n - np.round(jumps * n)) > SAME_PHASE
+    if path.levels or within.any() or (len(jumps) and (n == 1 or pressure.heading)):
         return True
     begins, ends = path.limits_at(np.arange(n) / n)[1], path.limits_at(np.arange(1, n + 1) / n)[0]
     return bool(len(jumps) and differ(begins, ends).any())
@@ -258,7 +251,7 @@ def is_abrupt(pressure: MovingPressure) -> bool:
 def is_cut_short(pressure: MovingPressure) -> bool:
     """Whether a path that jumps takes longer than the Tacton."""
     f_d, duration = pressure.tacton.trajectory.drawing_frequency, pressure.tacton.duration
-    return 0 < f_d * duration < 1 - ROUND_OFF and is_abrupt(pressure)
+    return 0 < f_d * duration < 1 - SAME_PHASE and is_abrupt(pressure)
 
 
 def without_sampled_parts(pressure: MovingPressure) -> MovingPressure:
@@ -268,20 +261,21 @@ def without_sampled_parts(pressure: MovingPressure) -> MovingPressure:
 
 def highest_passing(pressure: MovingPressure) -> float:
     """Highest line in Hz, above 1e-7 of all, of a moving focus; at most `HIGHEST` if recorded."""
-    highest = (
-        PASSING_LIMIT * _top_speed(pressure.tacton) / spot_detail(pressure.height, pressure.profile)
-    )
+    detail = spot_detail(pressure.height, pressure.profile)
+    highest = REACH / (2 * np.pi) * _top_speed(pressure.tacton.trajectory) / detail
     return min(highest, HIGHEST) if pressure.tacton.trajectory.shape == "recorded" else highest
 
 
-def _count(pressure: MovingPressure) -> int:
-    """Number of cells of a path; one if the focus is static."""
+def _count(pressure: MovingPressure, fewest: int = 132) -> int:
+    """Number of cells of a path, for harmonics below half of the `fewest`; one if the focus is
+    static.
+    """
     path, n = pressure.tacton.trajectory, pressure.tacton.n_paths
     detail = spot_detail(pressure.height, pressure.profile)
     if path.is_static:
         return 1
     enough, whole = KNOTS_PER_WIDTH * path.length / detail, 12
-    lines = PER_HIGHEST * HIGHEST / path.drawing_frequency
+    lines = SAMPLE_RATE / path.drawing_frequency
     if path.shape == "recorded":
         moves = (steps := np.diff(path.times)) > 0
         even = np.ptp(steps[moves]) < 1e-9 * path.times[-1]
@@ -291,8 +285,8 @@ def _count(pressure: MovingPressure) -> int:
             fastest = float((lengths[moves] / steps[moves]).max())
             enough = min(KNOTS_PER_WIDTH * fastest * path.times[-1] / detail, lines)
     if is_abrupt(pressure):
-        return int(fft.next_fast_len(int(np.ceil(max(enough, lines, FEWEST_KNOTS)))))
-    return whole * int(np.ceil(max(enough, FEWEST_KNOTS) / whole))
+        return int(fft.next_fast_len(int(np.ceil(max(enough, lines, fewest)))))
+    return whole * int(np.ceil(max(enough, fewest) / whole))
 
 
 def _rate(pressure: MovingPressure) -> float:
@@ -300,12 +294,13 @@ def _rate(pressure: MovingPressure) -> float:
     tacton, degree = pressure.tacton, pressure.law.degree
     made = highest_passing(pressure) + (degree or KNOTS_PER_WIDTH) * sum(tones(tacton))
     made += tacton.signal.rate if tacton.signal else 0.0
-    return max(LEAST_RATE, HIGHEST + made)
+    return max(40_000.0, HIGHEST + made)  # periods in milliseconds are whole cells
 
 
-def _top_speed(tacton: Tacton) -> float:
-    """Largest speed of a focus in m/s; moves shorter than `BRIEF` of a recording do not count."""
-    path = tacton.trajectory
+def _top_speed(path: Trajectory, brief: float = 0.01) -> float:
+    """Largest speed of a focus in m/s; a recording moves faster for at most the fraction `brief` of
+    its time.
+    """
     if path.shape != "recorded":
         return path.drawing_frequency * path.length * (np.pi / 2 if path.is_eased else 1.0)
     steps = np.diff(path.times)
@@ -314,5 +309,5 @@ def _top_speed(tacton: Tacton) -> float:
     speeds, lasting = lengths[moves] / steps[moves], steps[moves]
     order = np.argsort(speeds)
     passed = np.cumsum(lasting[order])
-    at = np.searchsorted(passed, (1 - BRIEF) * passed[-1])
+    at = np.searchsorted(passed, (1 - brief) * passed[-1])
     return float(speeds[order[min(at, len(order) - 1)]])

@@ -30,8 +30,6 @@ from simple_model.load.tacton import Tacton, level, modulation
 from simple_model.typing import Floats
 
 HEADINGS = ("x", "y", "")
-SAMPLES_PER_AVERAGE = 8  # of a rhythm or signal
-SAMPLES_IN_CACHE = 2**15  # evaluated at a time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,14 +85,9 @@ class MovingPressure:
                 "the focus rests or jumps from point to point, so its path has no direction; give "
                 "a fixed direction, or a path along which the focus moves"
             )
-        self._check_levels()
-
-    def _check_levels(self) -> None:
-        tacton = self.tacton
-        enveloped = tacton.signal is not None and tacton.signal.role == "envelope"
-        if not (tacton.trajectory.levels or tacton.rhythm or enveloped):
-            return
-        if not self.law.is_product(tacton.amplitude, self.depth_of_modulation):
+        rhythm, signal = self.tacton.rhythm, self.tacton.signal
+        has_levels = path.levels or rhythm or (signal and signal.role == "envelope")
+        if has_levels and not self.law.is_product(self.tacton.amplitude, self.depth_of_modulation):
             raise ValueError(
                 f"drive law '{self.law}' is not a product of factors for the level and for the "
                 "modulation, so that it supports no path levels, rhythm or envelope; remove "
@@ -127,7 +120,7 @@ class MovingPressure:
         gains = [gain * self.weight(phase) if weighted else gain for phase in phases]
         foci = [path.at_phase(phase) for phase in phases]
         pressure = np.zeros((t.size, len(points)))
-        block = max(1, SAMPLES_IN_CACHE // max(1, len(points)))
+        block = max(1, 2**15 // max(1, len(points)))  # so that arrays stay in cache
         for start in range(0, t.size, block):
             part = slice(start, start + block)
             for each, centres in zip(gains, foci, strict=True):
@@ -143,14 +136,14 @@ class MovingPressure:
             factor = factor * path.tangent_at_phase(phase)[..., HEADINGS.index(self.heading)]
         return factor
 
-    def gain(self, t: ArrayLike, over: float = 0.0) -> Floats:
+    def gain(self, t: ArrayLike, over: float = 0.0, samples: int = 8) -> Floats:
         """Pressure (...) in Pa at each focus at times (...) in s, without the level of the path.
 
-        Rhythms and signals are averaged over a time `over` in s about each time, but not before the
-        start.
+        Rhythms and signals are averaged by some `samples` over a time `over` in s about each time,
+        but not before the start.
         """
         if over and self.tacton.is_sampled:
-            parts = ((np.arange(SAMPLES_PER_AVERAGE) + 0.5) / SAMPLES_PER_AVERAGE - 0.5) * over
+            parts = ((np.arange(samples) + 0.5) / samples - 0.5) * over
             fine = np.asarray(t, np.float64)[..., None] + parts
             has_started = fine >= 0
             gain = self.gain(np.maximum(fine, 0.0)) * has_started

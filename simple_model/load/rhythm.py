@@ -13,7 +13,6 @@ from simple_model.choices import check_numbers, check_range, choose
 from simple_model.typing import Floats, Ints
 
 ROLES = ("modulation", "envelope")
-MOST_SAMPLES = 2_000_000
 
 
 def between(knots: Floats, t: Floats, after: Floats) -> tuple[Ints, Floats]:
@@ -112,9 +111,9 @@ class Signal:
     def __post_init__(self) -> None:
         choose("signal role", self.role, ROLES)
         check_numbers("a signal", self, "rate")
-        check_range("number of samples", len(self.samples), 2, MOST_SAMPLES, "", " of a signal")
+        check_range("number of samples", len(self.samples), 2, 2_000_000, "", " of a signal")
         low = -1 if self.role == "modulation" else 0
-        if not ((self._values >= low) & (self._values <= 1)).all():
+        if not ((self._round >= low) & (self._round <= 1)).all():
             raise ValueError(
                 f"samples of a signal must be between {low} and 1; scale them to full drive"
             )
@@ -122,13 +121,9 @@ class Signal:
     def at(self, t: ArrayLike) -> Floats:
         """Value (...) at times (...) in s."""
         at = np.mod(np.asarray(t, np.float64) * self.rate, len(self.samples))
-        return np.asarray(np.interp(at, np.arange(len(self._values) + 1), self._round))
-
-    @cached_property
-    def _values(self) -> Floats:
-        return np.array(self.samples, np.float64)
+        return np.asarray(np.interp(at, np.arange(len(self._round)), self._round))
 
     @cached_property
     def _round(self) -> Floats:
         """The samples, followed by the first one."""
-        return np.append(self._values, self._values[0])
+        return np.array([*self.samples, self.samples[0]], np.float64)

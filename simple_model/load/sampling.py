@@ -17,11 +17,6 @@ from simple_model.load.spectrum import ALIASED, gain_orders
 from simple_model.load.tacton import tones
 from simple_model.typing import Bools, Floats
 
-LEAST_RATE = 10_000.0  # Hz; samples at this rate show all motion of a body
-PER_PERIOD = 8  # samples of the highest frequency, so that its start is accurate
-REACH = 128  # samples of a low pass on either side: it ends within 2 % of half the rate
-STOP_BAND = ("kaiser", 10.0)  # 100 dB down
-
 
 def step(times: Floats) -> float:
     """Sampling interval in s of equally spaced times (t,)."""
@@ -54,7 +49,7 @@ def highest_line(pressure: MovingPressure) -> float:
 
 def oversampling(highest: float, dt: float) -> int:
     """Samples per interval dt in s for lines up to `highest` Hz; 1 if nothing aliases."""
-    return 1 if highest < 0.5 / dt else ceil(PER_PERIOD * highest * dt)
+    return 1 if highest < 0.5 / dt else ceil(8 * highest * dt)  # so that their start is accurate
 
 
 def below_half_the_rate(frequencies: Floats, times: Floats) -> Bools:
@@ -67,7 +62,7 @@ def is_folded(pressure: MovingPressure, times: Floats) -> bool:
     if not isinstance(pressure, MovingPressure):
         return False
     dt = step(times)
-    if dt * LEAST_RATE > 1 + 1e-6:
+    if dt * 10_000.0 > 1 + 1e-6:  # samples at 10 kHz show all motion of a body
         return True
     return oversampling(highest_line(pressure), dt) > 1 and not (
         pressure.tacton.is_sampled or is_abrupt(pressure)
@@ -79,21 +74,23 @@ def highest_driving(pressure: MovingPressure, times: Floats) -> float:
     return 0.5 / step(times) if is_folded(pressure, times) else np.inf
 
 
-def low_pass(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
+def low_pass(
+    load: Callable[[Floats], Floats], times: Floats, parts: int, reach: int = 128
+) -> Floats:
     """Load (t, ...) at equally spaced times (t,) in s without aliasing, by a windowed sinc.
 
     `load` is a function of times (n,), also outside the given ones, sampled `parts` times as
-    finely.
+    finely. The filter ends within 2 % of half the rate, because it has a `reach` of many samples.
     """
     if parts == 1:
         return load(times)
     from scipy.signal import firwin, upfirdn  # slow to import
 
     dt = step(times)
-    taps = firwin(2 * REACH * parts + 1, 1 / parts, window=STOP_BAND)
-    around = np.arange(-REACH * parts, (len(times) - 1 + REACH) * parts + 1)
+    taps = firwin(2 * reach * parts + 1, 1 / parts, window=("kaiser", 10.0))  # 100 dB down
+    around = np.arange(-reach * parts, (len(times) - 1 + reach) * parts + 1)
     filtered = upfirdn(taps, load(times[0] + around * (dt / parts)), down=parts, axis=0)
-    return np.asarray(filtered[2 * REACH :][: len(times)])
+    return np.asarray(filtered[2 * reach :][: len(times)])
 
 
 def resolving_step(pressure: MovingPressure, longest: float) -> float:

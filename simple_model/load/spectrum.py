@@ -33,13 +33,7 @@ from simple_model.load.pressure import MovingPressure, check_lines
 from simple_model.load.tacton import modulation_at_phases, tones
 from simple_model.typing import Complex, Floats, Ints
 
-PHASES = 8  # of each sinusoid, at least
-MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all
 ALIASED = 1e-4  # of the strongest: largest harmonic of a drive law beyond those sampled
-MANY_LINES, RAISED_POWER = 20, 8  # lines of a jump; power of frequency that raises the last
-PRODUCTS = 2**22  # of amplitudes and exponentials at a time
-EQUAL_STEPS = 1e-9  # relative difference of steps between equally spaced times
-LINES_AT_ONCE = 2**24  # times points, some hundred megabytes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,17 +93,18 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
     )  # fmt: skip
 
 
-def lines_from_rest(pressure: MovingPressure) -> LoadSpectrum:
+def lines_from_rest(pressure: MovingPressure, fewest: int = 20, n: int = 8) -> LoadSpectrum:
     """`load_lines`, adjusted to give a body the impulse of the load after its start.
 
     The lines of a jump d that end at a frequency F lack an impulse of d / (2 pi^2 F). Factors of 1
     + (n - 1) (f / F)^n, whose integral over 1/f^2 equals that of the lines beyond F, restore it.
+    Fewer lines than `fewest` are left as they are.
     """
     lines, whole = load_lines(pressure), path_cells(pressure)
-    few = whole.frequency * MANY_LINES > HIGHEST
+    few = whole.frequency * fewest > HIGHEST
     if few or not (whole.of_tacton or is_abrupt(pressure)):
         return lines
-    raised = 1 + (RAISED_POWER - 1) * (lines.frequencies / HIGHEST) ** RAISED_POWER
+    raised = 1 + (n - 1) * (lines.frequencies / HIGHEST) ** n
     return replace(lines, coefficients=lines.coefficients * raised)
 
 
@@ -121,7 +116,8 @@ def pressure_lines(
     """
     lines, knots = load_lines(pressure, threshold), path_samples(pressure)
     points = np.asarray(points, np.float64)
-    count = max(1, len(points) * path_cells(pressure).cells.shape[0] // LINES_AT_ONCE)
+    cells = path_cells(pressure).cells.shape[0]
+    count = max(1, len(points) * cells // 2**24)  # some hundred megabytes at a time
     parts = [
         lines.gather(path_fourier(pressure, pressure.spot(some, knots).T).T)
         for some in np.array_split(points, count)
@@ -178,22 +174,24 @@ def foci_harmonics(pressure: MovingPressure, n: Ints) -> Complex:
     return np.asarray(np.exp(2j * np.pi * n[:, None] * pressure.tacton.foci).sum(axis=1))
 
 
-def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
+def synthesise(
+    frequencies: Floats, amplitudes: Complex, times: Floats, products: int = 2**22
+) -> Floats:
     """Waveforms (t, p) = Re sum a exp(2 pi i f t) of amplitudes a (f, p) at frequencies (f,) in Hz
-    and times (t,) in s.
+    and times (t,) in s, with a number of `products` of amplitudes and exponentials at a time.
 
     >>> synthesise(np.array([0.0, 50.0]), np.array([[1.0 + 0j], [2j]]), np.array([0.0, 0.005]))
     array([[ 1.],
            [-1.]])
     """
     apart = np.diff(times)
-    equal = len(times) > 1 and np.ptp(apart) <= EQUAL_STEPS * abs(apart[0])
+    equal = len(times) > 1 and np.ptp(apart) <= 1e-9 * abs(apart[0])
     block = int(np.ceil(np.sqrt(len(times)))) if equal else max(1, len(times))
     # Exponentials are products of those within the first block of times and at the start of each.
     within = np.exp(2j * np.pi * np.outer(times[:block] - times[:1], frequencies))
     starts = np.exp(2j * np.pi * np.outer(frequencies, times[::block]))
     real, imag, p = within.real.copy(), within.imag.copy(), amplitudes.shape[1]
-    values, some = [], max(1, PRODUCTS // max(1, amplitudes.size))
+    values, some = [], max(1, products // max(1, amplitudes.size))
     for first in range(0, max(1, starts.shape[1]), some):
         turned = starts[:, first : first + some, None] * amplitudes[:, None]
         together = turned.reshape(len(frequencies), turned.shape[1] * p)
@@ -218,16 +216,15 @@ def gain_orders(
 
     The modulation is multiplied by each of `factors` (k,). For a drive law that is not a
     polynomial, the number of phases is doubled until its harmonics fall below `ALIASED`. Raises a
-    ValueError if `MOST_PHASES` are not enough.
+    ValueError if 1024 phases of one sinusoid, or 2^20 of all, are not enough.
     """
-    law, n_tones = pressure.law, np.count_nonzero(tones(pressure.tacton))
-    count = PHASES if law.degree is None else max(PHASES, 2 * law.degree + 2)
-    each, together = MOST_PHASES
-    while law.degree is not None or (count <= each and count**n_tones <= together):
+    law, n_tones, count = pressure.law, np.count_nonzero(tones(pressure.tacton)), 8
+    if law.degree is not None:
+        return _at_phases(pressure, factors, max(count, 2 * law.degree + 2))
+    while count <= 2**10 and count**n_tones <= 2**20:
         orders, c = _at_phases(pressure, factors, count)
         beyond = (4 * np.abs(orders) >= count).any(axis=1)
-        strongest = np.abs(c).max()
-        if law.degree is not None or np.abs(c[:, beyond]).max(initial=0.0) <= ALIASED * strongest:
+        if np.abs(c[:, beyond]).max(initial=0.0) <= ALIASED * np.abs(c).max():
             return orders, c
         count *= 2
     raise unbounded_harmonics_error(law)

@@ -16,17 +16,15 @@ from numpy.typing import ArrayLike
 
 from simple_model.choices import check_numbers, check_range, choose
 from simple_model.load.rhythm import Rhythm, Signal
-from simple_model.load.trajectory import Trajectory
+from simple_model.load.trajectory import SAME_PHASE, Trajectory
 from simple_model.typing import Floats
 
 CARRIER = 40e3  # Hz
 LONGEST = 30.0  # s
 MOST_FOCI = 8  # that devices make at a time
 SHARINGS = ("simultaneous", "time_multiplexed")
-SAME_PHASE = 1e-9  # of a drawing period
 COMMENSURATE = 1e-6  # largest relative distance from a whole multiple of a common frequency
 RETURN_TOLERANCE = 0.01  # of a turn
-PATH_ORDERS, TONE_ORDERS = 5, 2  # multiples whose differences count as beats
 SUPERPOSITIONS = ((1.0, 0.0), (0.75, 0.25), (0.5, 0.5), (0.25, 0.75), (0.0, 1.0))
 
 
@@ -224,10 +222,10 @@ def _symmetry(foci: tuple[float, ...]) -> int:
 
 
 def _slowest_beat(by_name: dict[str, float], duration: float) -> float:
-    """Period in s, at most the duration, of the slowest difference of low multiples."""
-    orders = {
-        name: PATH_ORDERS if name in ("f_d", "f_r", "f_s") else TONE_ORDERS for name in by_name
-    }
+    """Period in s, at most the duration, of the slowest difference of low multiples: up to 5 of a
+    path, a rhythm or a signal, and up to 2 of a sinusoid.
+    """
+    orders = {name: 5 if name in ("f_d", "f_r", "f_s") else 2 for name in by_name}
     multiples = [f * np.arange(1, orders[name] + 1) for name, f in by_name.items()]
     beats = [np.abs(a[:, None] - b).ravel() for k, a in enumerate(multiples) for b in multiples[:k]]
     each = np.concatenate([*multiples, *beats])

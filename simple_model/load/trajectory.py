@@ -22,21 +22,16 @@ SHAPES = ("point", "line", "circle", "triangle", "square")  # defined by a size 
 BY_POINTS = ("polyline", "recorded")
 SWEEPS = ("there_and_back", "one_way", "sinusoidal")
 LARGEST_SIZE = 0.060  # m, of a palm
-FARTHEST_POINT = 0.300  # m, largest coordinate that devices steer to
-MOST_POINTS = 1_000_000
-TANGENT_STEP = 1e-6  # of a period, or of its part between two points
-LEAST_TURN = 1e-3  # of a unit tangent; a smaller change is no turn
 LEAST_JUMP = 1e-7, 1e-6  # m and of the level; smaller changes are no jump
 CORNERS_OF_CIRCLE = 132  # 0.01 mm from the largest circle; also for a line swept as a cosine
 SAME_PHASE = 1e-9  # of a period
-JUST_AFTER = 1e-9  # of the mean step of a recording: a sample holds at its own time
-
-_TOP, _LEFT, _RIGHT = (0.0, 1 / sqrt(3)), (-0.5, -0.5 / sqrt(3)), (0.5, -0.5 / sqrt(3))
 UNIT = {  # corners of shapes of size 1
     "line": ((-0.5, 0.0), (0.5, 0.0)),
-    "triangle": (_TOP, _LEFT, _RIGHT, _TOP),
+    "triangle": (
+        (0.0, 1 / sqrt(3)), (-0.5, -0.5 / sqrt(3)), (0.5, -0.5 / sqrt(3)), (0.0, 1 / sqrt(3)),
+    ),
     "square": ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5), (0.5, 0.5)),
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,8 +132,7 @@ class Trajectory:
 
     def tangent_at_phase(self, phase: ArrayLike) -> Floats:
         """Unit tangent (..., 2) of the motion at fractions (...) of the period; 0 at rest."""
-        phase = np.asarray(phase, np.float64)
-        step = TANGENT_STEP / max(1, len(self.points))
+        phase, step = np.asarray(phase, np.float64), self._tangent_step
         way = np.subtract(*(self.at_phase(np.mod(phase + d, 1.0)) for d in (step, -step)))
         length = np.linalg.norm(way, axis=-1, keepdims=True)
         return np.asarray(way / np.where(length > 0, length, 1.0))
@@ -178,9 +172,9 @@ class Trajectory:
     @cached_property
     def turns(self) -> Floats:
         """Fractions (j,) of the period, in [0, 1), at which the direction jumps."""
-        starts, aside = self.parts[0][:-1], 2 * TANGENT_STEP / max(1, len(self.points))
+        starts, aside = self.parts[0][:-1], 2 * self._tangent_step
         ways = self.tangent_at_phase(np.mod([starts - aside, starts + aside], 1.0))
-        return starts[np.abs(ways[1] - ways[0]).max(axis=-1) > LEAST_TURN]
+        return starts[np.abs(ways[1] - ways[0]).max(axis=-1) > 1e-3]  # less is no turn
 
     def limits_at(self, phases: Floats) -> tuple[Floats, Floats]:
         """Positions and level (k, 3) just before and just after fractions (k,) of the period."""
@@ -195,9 +189,13 @@ class Trajectory:
         return self.at_phase(np.clip(phases, start + self._nearby, end - self._nearby))
 
     @property
+    def _tangent_step(self) -> float:
+        return 1e-6 / max(1, len(self.points))
+
+    @property
     def _nearby(self) -> float:
         """Fraction of the period between distinct times in which nothing moves."""
-        return 2 * JUST_AFTER / max(1, len(self.points) - 1)
+        return 2e-9 / max(1, len(self.points) - 1)
 
     def _about_origin(self, phase: Floats) -> Floats:
         if self.shape == "point":
@@ -240,10 +238,12 @@ class Trajectory:
         return np.array(self.times, np.float64)
 
     def _between(self, phase: Floats) -> tuple[Ints, Floats]:
-        """Index of the last point of a recording, and the fraction of the way to the next."""
+        """Index of the last point of a recording, and the fraction of the way to the next; a sample
+        holds at its own time.
+        """
         clock = self._clock
         t = phase * clock[-1]
-        before, part = between(clock, t, t + JUST_AFTER * clock[-1] / (len(clock) - 1))
+        before, part = between(clock, t, t + self._nearby / 2 * clock[-1])
         return before, np.zeros_like(t) if self.hold else part
 
 
@@ -314,7 +314,8 @@ def split_recording(path: Trajectory, n: int) -> tuple[Floats, ...]:
     return tuple(path.outline[a : b + 1] for a, b in zip(first, last, strict=True))
 
 
-def _check_points(path: Trajectory) -> None:
+def _check_points(path: Trajectory, most: int = 1_000_000, farthest: float = 0.300) -> None:
+    """Refuse more than `most` points, and points beyond `farthest` in m, the reach of devices."""
     count = len(path.points)
     if (count < 2 or path.size != 0) if path.shape in BY_POINTS else count > 0:
         raise ValueError(
@@ -322,14 +323,14 @@ def _check_points(path: Trajectory) -> None:
             "polyline or recorded path at least two points and no size, other shapes a size and no "
             "points"
         )
-    check_range("number of points", count, 0, MOST_POINTS)
+    check_range("number of points", count, 0, most)
     try:
         places = np.array([path.centre, *path.points], np.float64)
     except (TypeError, ValueError):
         raise ValueError("points and centre must be pairs of numbers, such as (0.01, 0)") from None
-    if places.shape[1:] != (2,) or not (np.abs(places) <= FARTHEST_POINT).all():
+    if places.shape[1:] != (2,) or not (np.abs(places) <= farthest).all():
         raise ValueError(
-            f"points and centre must be pairs within ±{1e3 * FARTHEST_POINT:g} mm, the reach of "
+            f"points and centre must be pairs within ±{1e3 * farthest:g} mm, the reach of "
             "devices; move or shrink the path"
         )
 

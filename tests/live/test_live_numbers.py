@@ -3,6 +3,7 @@
 import csv
 import re
 from dataclasses import replace
+from functools import partial
 from io import BytesIO
 
 import numpy as np
@@ -74,7 +75,8 @@ def test_long_ramps_and_paths_off_the_body_are_refused(page, starts):
 
 def test_lines_of_the_load(page, starts, monkeypatch):
     # Interpolation along the path is exact to 1e-5 of a circle only.
-    monkeypatch.setattr(simple_model.load.path_cells, "NODES_PER_WIDTH", 1e7)
+    exact = partial(simple_model.load.path_cells.along_path, nodes_per_detail=1e7)
+    monkeypatch.setattr(simple_model.load.path_cells, "along_path", exact)
     simple_model.load.path_cells.path_cells.cache_clear()
     many = some_values(starts, 50, rhythm=False)
     found = page.evaluate(
