@@ -20,11 +20,7 @@ from simple_model.layers.prony import PronySeries, PronyTerm, fit_prony
 from simple_model.layers.stack import Stack
 from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
 from simple_model.load.drive import DRIVES, DriveLaw
-from simple_model.load.focus import (
-    array_field,
-    focal_spot,
-    relative_intensity,
-)
+from simple_model.load.focus import array_field, focal_spot, relative_intensity
 from simple_model.load.line_names import named_lines
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.rhythm import Rhythm, Signal

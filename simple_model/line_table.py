@@ -90,19 +90,9 @@ def line_table(
     """List the lines of a response to a load.
 
     Listed by name are lines of the load above -60 dB of its strongest, weaker ones above -60 dB of
-    the strongest line of the response, and the candidates.
-
-    Parameters
-    ----------
-    pressure : MovingPressure, the load
-    response : Response
-    candidates : names of lines that are always listed
-    other_lines : names and frequencies in Hz of other motion of the body; a line of the pressure at
-        the same frequency takes precedence
-
-    Returns
-    -------
-    LineTable, Hz and the unit of the response
+    the strongest line of the response, and the `candidates`. `other_lines` are names and
+    frequencies in Hz of other motion of the body; a line of the pressure at the same frequency
+    takes precedence.
 
     >>> from simple_model import Tacton, point_kernel
     >>> load = MovingPressure(tacton=Tacton(am_frequency=140.0))
@@ -164,18 +154,10 @@ def resolved_lines(
     candidates: Iterable[str] = (),
     highest: float = np.inf,
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Separate the resolved from the unresolved lines of a load.
+    """Return frequencies in Hz by name: of the resolved lines of a load, and of the unresolved.
 
-    Parameters
-    ----------
-    pressure : MovingPressure, whose lines above -60 dB are used
-    response : Response, whose duration decides which lines are resolved
-    candidates : names of lines that are always listed
-    highest : Hz; higher lines are left out
-
-    Returns
-    -------
-    frequencies in Hz by name: of the resolved lines, and of the unresolved ones
+    They are the lines above -60 dB and the `candidates`, below `highest` in Hz. The duration of the
+    response decides which lines are resolved.
     """
     response = replace(response, load=pressure)
     highest = min(highest, 0.5 / step(response.times))

@@ -38,20 +38,10 @@ def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: F
 
 
 def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """Compute the stimulation under the given load.
+    """Compute the stimulation (t, p) in Pa of probes (p, 2) in m at equally spaced times (t,) in s.
 
     Lines above half the sampling rate are left out. Raises a ValueError for probes of another
     shape.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    probes : (p, 2) float, m
-    times : (t,) float, s, equally spaced
-
-    Returns
-    -------
-    Response, stimulation (t, p) in Pa
 
     >>> from simple_model import Tacton
     >>> load = MovingPressure(tacton=Tacton(am_frequency=140.0), drive="linear")

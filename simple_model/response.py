@@ -297,22 +297,14 @@ def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE)
 
 
 def phasors(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Complex:
-    """Compute phasors: complex amplitudes a of Re a exp(2 pi i f t), by weighted least squares.
+    """Compute phasors (f, p): complex amplitudes a of Re a exp(2 pi i f t), in the unit of the
+    response, by weighted least squares.
 
     All lines and the mean are fitted together under a Kaiser window, which suppresses leakage from
     other lines and from a transient that decays. Lines closer than one over the fitted time are
-    unresolved and share one amplitude, see `are_resolved`. Raises a ValueError for frequencies out
-    of range, or a response of too few samples.
-
-    Parameters
-    ----------
-    response : Response
-    frequencies : (f,) float, Hz, below half the sampling rate; 0 gives the mean
-    settle : fraction of the response left out at its start
-
-    Returns
-    -------
-    (f, p) complex, in the unit of the response
+    unresolved and share one amplitude, see `are_resolved`. Frequencies (f,) in Hz are below half
+    the sampling rate; 0 gives the mean. The fraction `settle` of the response is left out at its
+    start. Raises a ValueError for other frequencies, or a response of too few samples.
     """
     return fit_lines(response, frequencies, settle=settle)[0]
 
@@ -346,21 +338,11 @@ def are_resolved(
     settle: float = SETTLE,
     strengths: ArrayLike | None = None,
 ) -> Bools:
-    """Return which lines are resolved from 0 Hz and from each other.
+    """Return which lines (f,) of frequencies (f,) in Hz are resolved from 0 Hz and from each other.
 
-    Frequencies that differ by at most `ALIKE` times the resolution are one line. Near a resolved
-    line, other lines and leakage of unresolved ones have at most 5 % of its strength.
-
-    Parameters
-    ----------
-    response : Response
-    frequencies : (f,) float, Hz
-    strengths : (f,) float, in any unit; equal if not given
-    settle : fraction of the response left out at its start
-
-    Returns
-    -------
-    (f,) bool
+    Near a resolved line, other lines and leakage of unresolved ones have at most 5 % of its
+    strength. Strengths (f,) may have any unit and are equal if not given. Frequencies that differ
+    by at most 0.1 % of the resolution are one line. `settle` is that of `phasors`.
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     strengths = np.ones_like(frequencies) if strengths is None else np.asarray(strengths)

@@ -61,20 +61,12 @@ def pressure_threshold(frequency: ArrayLike) -> Floats:
 def sensation_level(
     amplitude: ArrayLike, frequency: ArrayLike, area: str = "focal_spot", *, unit: str = "m"
 ) -> Floats:
-    """Return the sensation level of lines: their level above the detection threshold.
+    """Return the sensation level (...) of lines in dB: their level above the detection threshold.
 
+    It is that of a peak displacement (unit "m") or pressure ("Pa", see `pressure_threshold`) at
+    frequencies (...) in Hz, and minus infinity if the amplitude is 0 or the threshold is unknown.
     The line with the highest level determines whether a signal is felt: channels do not add up.
-
-    Parameters
-    ----------
-    amplitude : (...) float, peak displacement or pressure of each line
-    frequency : (...) float, Hz
-    area : see `threshold`
-    unit : of the amplitude, "m" or "Pa" (see `pressure_threshold`)
-
-    Returns
-    -------
-    (...) float, dB; minus infinity if the amplitude is 0 or the threshold is unknown
+    The area is that of `threshold`.
 
     >>> sensation_level([1e-6, 1e-5], 200.0).round(1)
     array([ 9.1, 29.1])

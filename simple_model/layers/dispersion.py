@@ -125,26 +125,13 @@ class DispersionCurves:
 
 
 def dispersion_curves(stack: Stack, frequencies: ArrayLike, *, most: int = 6) -> DispersionCurves:
-    """Compute the dispersion curves of a stack of layers.
+    """Compute at least one and at most `most` dispersion curves of a stack of layers, those of the
+    least evanescent modes.
 
     Finite stacks use the thin-layer method. Layers on a half-space use the same with a perfectly
     matched layer, and refine its roots with the exact stiffness of the half-space. A half-space
-    alone has the Rayleigh wave.
-
-    Parameters
-    ----------
-    stack : Stack
-    frequencies : (f,) float, Hz, above 0 and ascending
-    most : largest number of modes, the least evanescent
-
-    Returns
-    -------
-    DispersionCurves, with at least one mode
-
-    Raises
-    ------
-    ValueError
-        If frequencies are not above 0 and ascending, or layers are too many wavelengths thick.
+    alone has the Rayleigh wave. Raises a ValueError unless frequencies (f,) in Hz are above 0 and
+    ascending, or if layers are too many wavelengths thick.
 
     >>> from simple_model.layers.material import PRESETS
     >>> slab = Stack(materials=(PRESETS["palm"],), thicknesses=(0.015,))

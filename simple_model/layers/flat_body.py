@@ -192,11 +192,11 @@ def steady_state(
 def flat_body(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Response:
-    """Compute the normal displacement of probes from rest.
+    """Compute the normal displacement of probes from rest, relative to the rest position.
 
     The FFT over twice the duration has exponential damping, which reduces the wrap-around to 1e-5.
-    Lines of the load above half the sampling rate are left out. Displacement is relative to the
-    rest position.
+    Lines of the load above half the sampling rate are left out. Raises a ValueError if the focus is
+    no sum of Gaussians, or if the load is a subclass of MovingPressure.
 
     Parameters
     ----------
@@ -204,15 +204,6 @@ def flat_body(
     pressure : MovingPressure, with a Gaussian focus or a `SpotMap`
     probes : (p, 2) float, m
     times : (t,) float, s, equally spaced
-
-    Returns
-    -------
-    Response, displacement (t, p) in m
-
-    Raises
-    ------
-    ValueError
-        If the focus is no sum of Gaussians, or the load is a subclass of MovingPressure.
 
     >>> from simple_model import Tacton
     >>> from simple_model.layers.compliance import slab

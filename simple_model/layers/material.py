@@ -282,17 +282,8 @@ def orthotropic(
     *, density: float, young_x: float, young_y: float, poisson_xy: float,
     shear_xy: float | None = None, **losses: Any,
 ) -> Material:  # fmt: skip
-    """Return the material of a sheet from its moduli along x and y; losses are isotropic.
-
-    Parameters
-    ----------
-    density : float, kg/m3
-    young_x, young_y, poisson_xy, shear_xy : see `Orthotropy`
-    **losses : `viscosity`, `loss_factor` and `prony` of `Material`
-
-    Returns
-    -------
-    Material, with shear modulus and Poisson's ratio of the isotropic mean
+    """Return the material of a sheet from its density in kg/m3 and its moduli along x and y, as in
+    `Orthotropy`. Its `viscosity`, `loss_factor` and `prony` terms are isotropic, as in `Material`.
     """
     along = Orthotropy(young_x=young_x, young_y=young_y, poisson_xy=poisson_xy, shear_xy=shear_xy)
     return Material(
@@ -313,23 +304,11 @@ def of_law(*, density: float, poisson: float, law: Any) -> Material:
 def tabulated(
     *, density: float, poisson: float, frequencies: ArrayLike, moduli: ArrayLike
 ) -> Material:
-    """Return a material from measured complex shear moduli.
+    """Return a material from its density in kg/m3, Poisson's ratio and measured complex shear
+    moduli (k,) in Pa at ascending frequencies (k,) in Hz, of which the first may be 0.
 
-    Parameters
-    ----------
-    density : float, kg/m3
-    poisson : float
-    frequencies : (k,) float, Hz, ascending; the first may be 0
-    moduli : (k,) complex, Pa, at each frequency
-
-    Returns
-    -------
-    Material, whose modulus at rest is that at 0 Hz or that of the Prony series of the table
-
-    Raises
-    ------
-    ValueError
-        As `ModulusTable` does.
+    Its modulus at rest is that at 0 Hz or that of the Prony series of the table. Raises a
+    ValueError as `ModulusTable` does.
 
     >>> moduli = [25e3, 27e3 + 5e3j, 29e3 + 8e3j]
     >>> solid = tabulated(density=1000, poisson=0.4999, frequencies=[0, 100, 200], moduli=moduli)

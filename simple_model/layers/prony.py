@@ -29,9 +29,6 @@ ModulusLaw = Callable[[Any], Any]  # complex shear modulus in Pa at angular freq
 FIT_TOLERANCE = 0.005  # relative deviation of a series; motion near resonances deviates more
 
 
-SLOWEST = 8.0  # Hz, 1 / (2 pi time)
-
-
 @dataclass(frozen=True, kw_only=True)
 class PronyTerm:
     """Prony term, a Maxwell branch in parallel with the rest. The `modulus` in Pa is 0 or above,
@@ -96,38 +93,29 @@ def fit_prony(
     tolerance: float = FIT_TOLERANCE,
 ) -> PronySeries:
     """Fit a Prony series to a modulus law: the one with the fewest terms within a tolerance over a
-    band.
+    band, or, for a noisy law, the shortest of almost equally close ones.
+
+    Raises a ValueError if the law is not passive or not causal in the band.
 
     Parameters
     ----------
     law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa
     band : lowest and highest frequency in Hz; by default of lines of loads and their modes
     rest : float, Pa, modulus at rest; fitted if not given
-    frequencies : Hz, within the band, fitted in addition to log-spaced ones
+    frequencies : Hz, within the band, fitted in addition to 40 log-spaced ones per decade
     tolerance : float, largest relative deviation |series - law| / |law|
-
-    Returns
-    -------
-    PronySeries; for a noisy law the shortest of almost equally close ones
-
-    Raises
-    ------
-    ValueError
-        If the law is not passive or not causal in the band.
     """
-    per_decade = 40  # frequencies at which a law is evaluated
-    count = 2 + round(per_decade * np.log10(band[1] / band[0]))
+    count = 2 + round(40 * np.log10(band[1] / band[0]))
     f = np.unique([*np.geomspace(*band, count), *(x for x in frequencies if x > 0)])
     w = 2 * np.pi * f
     mu = np.asarray(np.broadcast_to(law(w), w.shape), np.complex128)
-    check_modulus(f, mu)
+    check_causal(f, mu)
     candidates: list[PronySeries] = []
     beyond = (0.5, 1.0, 2.0, 4.0, 8.0)  # factors by which times extend beyond the ends of a band
     ends = [(w[0] / slow, w[-1] * fast) for slow in beyond for fast in beyond]
     most_terms = 16
-    far_below = 1e3  # times the slowest period over 2 pi: time of a term below the band
     # A law may relax far below the band, as fractional ones of small exponents do.
-    for further in ([], [far_below / w[0]]) if rest else ([],):
+    for further in ([], [1e3 / w[0]]) if rest else ([],):
         for n in range(most_terms + 1):
             fits = [
                 fitted_series(w, mu, np.append(1 / np.geomspace(*end, n), further), rest, band)
@@ -141,10 +129,9 @@ def fit_prony(
     return next(series for series in candidates if series.error <= enough)
 
 
-def check_modulus(frequencies: Floats, moduli: Complex, largest: float = 0.10) -> None:
+def check_causal(frequencies: Floats, moduli: Complex, largest: float = 0.10) -> None:
     """Refuse complex moduli (f,) in Pa at ascending frequencies (f,) in Hz unless they are passive
-    and causal. The relative distance of causal moduli from a series of non-negative terms is at
-    most `largest` (root mean square).
+    and causal: within `largest` (relative, root mean square) of a series of non-negative terms.
     """
     check_passive(frequencies, moduli)
     w = 2 * np.pi * frequencies
@@ -230,11 +217,10 @@ def constant_loss(
     beyond, half of it at 3 Hz, and 0 at rest, where the modulus is 0.92, 0.76 and 0.35 mu for eta =
     0.03, 0.1 and 0.4.
     """
-    loss_frequencies = 93  # at which the series is fitted
-    w, w_0 = 2 * np.pi * np.geomspace(*loss_band, loss_frequencies), 2 * np.pi * reference
+    w, w_0 = 2 * np.pi * np.geomspace(*loss_band, 93), 2 * np.pi * reference
     power = 2 / np.pi * np.arctan(loss_factor)
     exact = (1j * w / w_0) ** power / np.cos(np.pi * power / 2)
-    fastest, loss_terms = 1600.0, 4  # Hz, 1 / (2 pi time): best for losses up to 2
-    times = 1 / (2 * np.pi * np.geomspace(SLOWEST, fastest, loss_terms))
+    # Four terms of 8 Hz to 1.6 kHz are best for losses up to 2.
+    times = 1 / (2 * np.pi * np.geomspace(8.0, 1600.0, 4))
     series = fitted_series(w, exact, times, None, loss_band)
     return series.scaled(1 / float(series(w_0).real))

@@ -121,19 +121,12 @@ def lobe_width(height: float) -> float:
 def focal_spot(
     offsets: ArrayLike, height: float = NOMINAL_HEIGHT, profile: str | FocalSpot = "main_lobe"
 ) -> Floats:
-    """Focal spot S: intensity relative to the focus.
+    """Focal spot S (...): intensity relative to the focus at offsets (..., 2) in m from it, for a
+    height in m above the array.
 
-    Parameters
-    ----------
-    offsets : (..., 2) float, m from the focus
-    height : float, m, of the focus above the array
-    profile : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; "array", the
-        field of the array with its side lobes, to 60 mm along each axis; or a function of the
-        offsets
-
-    Returns
-    -------
-    (...) float, dimensionless
+    The profile is "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; "array",
+    the field of the array with its side lobes, to 60 mm along each axis; or a function of the
+    offsets.
 
     >>> focal_spot([[0.0, 0.0], [0.005, 0.0]]).round(3)
     array([1.  , 0.52])

@@ -71,18 +71,10 @@ def named_lines(
     most: int = MOST,
     candidates: Iterable[str] = (),
 ) -> dict[str, float]:
-    """Return names and frequencies of the lines of a load; see `line_names`.
+    """Return the frequencies in Hz of the lines of a load, by name.
 
-    Parameters
-    ----------
-    pressure : MovingPressure
-    threshold : fraction of the strongest line, 0 to 1; weaker lines are left out
-    most : largest number of lines, the strongest
-    candidates : names of lines that are listed in any case
-
-    Returns
-    -------
-    frequencies in Hz by name
+    They are at most `most` lines, the strongest, above a fraction `threshold` of the strongest one,
+    and the `candidates`; see `line_names`.
 
     >>> from simple_model import Tacton, Trajectory
     >>> circle = Trajectory(shape="circle", size=0.02, speed=12.0)

@@ -257,23 +257,11 @@ def differ(before: Floats, after: Floats) -> Bools:
 def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
     """Join the paths of several foci into one recording, which the foci share.
 
-    The recording runs through the n paths in turn. If each takes a time T, the period is n T. With
-    `even_phases(n)` as foci, each path has one focus at all times. A circle of diameter d becomes a
-    polygon, within d/2 (1 - cos(pi / 132)) of it.
-
-    Parameters
-    ----------
-    paths : named shapes; their own speed is ignored
-    frequency : float, Hz, above 0, at which each path is drawn
-
-    Returns
-    -------
-    Trajectory
-
-    Raises
-    ------
-    ValueError
-        If there are no paths, a path has points of its own, or the frequency is not above 0.
+    The recording runs through the n named shapes in turn, each drawn at a frequency in Hz instead
+    of its own speed. If each takes a time T, the period is n T. With `even_phases(n)` as foci, each
+    path has one focus at all times. A circle of diameter d becomes a polygon, within d/2 (1 -
+    cos(pi / 132)) of it. Raises a ValueError if there are no paths, if a path has points of its
+    own, or if the frequency is not above 0.
 
     >>> path = joined([Trajectory(shape="circle", size=0.02), Trajectory(shape="point")], 185.0)
     >>> path.shape, round(path.drawing_frequency, 1)

@@ -92,21 +92,14 @@ class KarmanPlate:
 def karman_plate(
     modes: PlateModes, thickness: float, count: int = 60, *, in_plane: str = "held"
 ) -> KarmanPlate:
-    """Compute the stiffness of a homogeneous plate at large deflection, for any load.
+    """Compute the stiffness of a homogeneous plate of a thickness in m at large deflection, for any
+    load.
 
-    For a square plate under a uniform pressure, 60 modes give the deflection within 0.1 % up to 4
-    times its thickness. Motion needs the modes up to about twice the highest frequency of the load.
-
-    Parameters
-    ----------
-    modes : PlateModes
-    thickness : float, m; membrane stiffness is 12 / thickness^2 times bending stiffness
-    count : int, number of modes that stretch the plate, the lowest ones
-    in_plane : effect of supported edges on the in-plane displacement: "held" fixes it, "sliding"
-        fixes only its component across the edge, "movable" leaves it free. Clips with a radius
-        always fix it.
-
-    Raises a ValueError if a value is out of range or unknown.
+    The lowest modes, `count`, stretch the plate. For a square plate under a uniform pressure, 60
+    modes give the deflection within 0.1 % up to 4 times its thickness. Motion needs the modes up to
+    about twice the highest frequency of the load. Supported edges fix the in-plane displacement
+    ("held"), only its component across the edge ("sliding"), or leave it free ("movable"). Clips
+    with a radius always fix it. Raises a ValueError if a value is out of range or unknown.
     """
     choose("in_plane", in_plane, IN_PLANE)
     if not (np.isfinite(thickness) and thickness > 0):
