@@ -18,14 +18,7 @@ import numpy as np
 
 from simple_model.choices import choose
 from simple_model.layers.material import Material
-from simple_model.layers.tensors import (
-    COMPONENTS,
-    energy_root,
-    hooke,
-    largest_shear,
-    sum_of_squares,
-    von_mises,
-)
+from simple_model.layers.tensors import COMPONENTS, energy_root, hooke, largest_shear, von_mises
 from simple_model.numbers import significant
 from simple_model.typing import Floats
 
@@ -166,5 +159,5 @@ register(Quantity(
 register(Quantity(
     name="energy_density", symbol="W", words="elastic strain energy density at the moduli at rest",
     unit="J/m3", shown="mJ/m³", per_unit=1e3, field=STRAIN, rows=energy_root,
-    invariant=sum_of_squares,
+    invariant=lambda values: np.asarray((values**2).sum(axis=-1)),
 ))  # fmt: skip

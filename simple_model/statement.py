@@ -83,8 +83,8 @@ class Statement:
     def summary(self) -> dict[str, Any]:
         """Return `expected_error` and its parts, `errors`, for JSON; an unknown error is None."""
         return {
-            "expected_error": _known(self.error),
-            "errors": [asdict(part) | {"error": _known(part.error)} for part in self.parts],
+            "expected_error": _finite_or_none(self.error),
+            "errors": [asdict(p) | {"error": _finite_or_none(p.error)} for p in self.parts],
         }
 
     def columns(self) -> dict[str, Any]:
@@ -106,5 +106,5 @@ class Statement:
         return Statement(parts=tuple(parts))
 
 
-def _known(error: float) -> float | None:
+def _finite_or_none(error: float) -> float | None:
     return error if isfinite(error) else None

@@ -139,16 +139,14 @@ def dispersion_curves(stack: Stack, frequencies: ArrayLike, *, most: int = 6) ->
     >>> [round(float(mode.phase_speed[0]), 2) for mode in modes[:2]]  # m/s
     [11.43, 7.39]
     """
-    f = checked_frequencies(frequencies)
+    f = check_frequencies(frequencies)
     omega = 2 * np.pi * f
     if stack.is_half_space and len(stack.materials) == 1:
         roots, depths = rayleigh_mode(stack.materials[0], omega)
         return curves(f, depths, roots, ("Rayleigh wave",))
-    candidates = 3  # roots that are tracked per returned mode
-    most_roots = candidates * most
+    most_roots = 3 * most
     fine, (roots, depths) = omega, _roots(stack, omega, most_roots)
-    rounds = 4  # of further frequencies between the given ones
-    for _ in range(rounds):
+    for _ in range(4):  # add frequencies between the given ones
         is_bound = np.abs(roots.wavenumbers.real) > _leaking(stack, fine)[:, None]
         is_wave = is_bound & ~_is_evanescent(roots.wavenumbers)
         further = frequencies_between(roots, fine, is_wave, most)
@@ -182,7 +180,7 @@ def _is_evanescent(wavenumbers: Complex) -> Bools:
     return np.asarray(np.abs(wavenumbers.imag) > fastest_decay * np.abs(wavenumbers.real))
 
 
-def checked_frequencies(frequencies: ArrayLike) -> Floats:
+def check_frequencies(frequencies: ArrayLike) -> Floats:
     """Return frequencies (f,) in Hz; raise a ValueError unless finite, above 0 and ascending."""
     f = np.atleast_1d(np.asarray(frequencies, np.float64))
     rises = np.isfinite(f).all() and f.ndim == 1 and (np.diff(f, prepend=0) > 0).all()
@@ -302,7 +300,7 @@ def sheet_curves(
     the same in all directions. An air density of 0 kg/m3 is vacuum. Shapes are given at both faces;
     along x they follow from the rotation of the section, U = k W z from the middle.
     """
-    f = checked_frequencies(frequencies)
+    f = check_frequencies(frequencies)
     omega = 2 * np.pi * f
     sheet = Stack(materials=(material,), thicknesses=(thickness,), base="free")
     mu, slope = (x[:, 0] for x in modulus_and_slope(sheet, omega))

@@ -76,8 +76,10 @@ def modes_above_half_space(
     converged = 1e-6  # last relative change of a root; round-off near nu = 0.5 is 1e-7
     farthest_move = 0.05  # of the shear wavenumber below: a root that moves further is no mode
     genuine = (np.abs(k - start) < farthest_move * np.abs(ks)) & (last < converged)
-    same_root = 1e-6  # of the shear wavenumber below: closer roots are one
-    genuine &= ~_is_repeated(k**2, genuine, same_root * np.abs(ks) ** 2)
+    away = np.abs((k**2)[:, :, None] - (k**2)[:, None])
+    is_same = away < 1e-6 * np.abs(ks[..., None]) ** 2
+    earlier = np.tri(k.shape[1], k=-1, dtype=bool)
+    genuine = genuine & ~(is_same & earlier & genuine[:, None]).any(axis=2)
     ends, up, down = _ends(terms), 1 + EPS, 1 - EPS
     by_k = (impedance(up * k) - impedance(down * k)) / (2 * EPS * k)[..., None, None]
     by_w = (impedance(k, EPS) - impedance(k, -EPS)) / (2 * EPS * w)[..., None, None]
@@ -146,10 +148,8 @@ def _refine(
     """
     ends = np.ix_(_ends(terms), _ends(terms))
     k, last = start, np.ones(start.shape)
-    steps, close = 10, 1e-11  # of inverse iteration; relative change at which it ends
-    beside = 1 + 1e-9 * (1 + 1j)  # factor of a root, where the matrix is not singular
-    for _ in range(steps):
-        at = beside * k  # where the matrix is not singular
+    for _ in range(10):
+        at = (1 + 1e-9 * (1 + 1j)) * k  # where the matrix is not singular
         matrix, slope = _matrix(terms, at, omega), _by_wavenumber(terms, at)
         matrix[..., ends[0], ends[1]] += impedance(at)
         change = (impedance((1 + EPS) * at) - impedance((1 - EPS) * at)) / (2 * EPS)
@@ -163,7 +163,7 @@ def _refine(
         x = np.where(lost[..., None], x, y)
         last = np.where(lost, 1.0, np.abs(new / k - 1))
         k = np.asarray(np.where(lost, k, new), np.complex128)
-        if (last[~lost] < close).all():
+        if (last[~lost] < 1e-11).all():
             break
     return k, x / np.linalg.norm(x, axis=-1, keepdims=True), last
 
@@ -244,10 +244,3 @@ def _ends(terms: Pencil) -> list[int]:
 def _form(x: Complex, matrix: Complex) -> Complex:
     """x^T matrix x (f, m) of vectors (f, m, n) and matrices (f, m, n, n)."""
     return np.asarray((x * (matrix @ x[..., None])[..., 0]).sum(axis=-1))
-
-
-def _is_repeated(k: Complex, genuine: np.ndarray, least: Floats) -> np.ndarray:
-    """Whether a root (f, m) is within `least` (f, 1) of an earlier genuine one."""
-    near = np.abs(k[:, :, None] - k[:, None]) < least[..., None]
-    earlier = np.tri(k.shape[1], k=-1, dtype=bool)
-    return np.asarray((near & earlier & genuine[:, None]).any(axis=2))

@@ -106,12 +106,12 @@ def clearance(stack: Stack, w: Complex) -> float:
     if not finite:
         return inf
     total = sum(thickness for _, thickness in finite)
-    turns = np.maximum(_resonance(finite, w, _shear) / 9, _resonance(finite, w, _compression))
+    compression = _resonance(finite, w, lambda nu: (2 - 2 * nu) / (1 - 2 * nu))  # lam + 2 mu
+    turns = np.maximum(_resonance(finite, w, lambda nu: 1.0) / 9, compression)
     backward = 0.5  # of the second resonance of a stack: above it some modes are backward waves
     decay = _decay(stack, w)[turns > (backward * np.pi / 2) ** 2 / 2]
     lowest = 1 / total if stack.is_rigid else min(1 / total, _bending(stack, w))
-    elastic_base = 0.5  # factor of the clearance above an elastic base
-    lowest *= elastic_base if stack.base_stiffness else 1.0
+    lowest *= 0.5 if stack.base_stiffness else 1.0
     return float(decay.min(initial=lowest))
 
 
@@ -126,7 +126,8 @@ def _bending(stack: Stack, w: Complex) -> float:
     theory about the neutral plane (Jones, Mechanics of Composite Materials (1999), chapter 4).
     """
     h = np.array(stack.thicknesses)
-    stiff = np.array([2 * _shear(m, w) / (1 - m.poisson) for m in stack.materials]) * h[:, None]
+    stiff = np.array([2 * m.complex_modulus(w) / (1 - m.poisson) for m in stack.materials])
+    stiff = stiff * h[:, None]
     z = (np.cumsum(h) - h / 2)[:, None]
     z = z - (stiff * z).sum(axis=0) / stiff.sum(axis=0)
     bending = (stiff * (z**2 + h[:, None] ** 2 / 12)).sum(axis=0)
@@ -138,30 +139,24 @@ def _bending(stack: Stack, w: Complex) -> float:
     return float(k.imag[(k.real > 0) & (k.imag > 0.1 * np.abs(k))].min(initial=inf))
 
 
-def _shear(material: Material, w: Complex) -> Complex:
-    return np.asarray(material.complex_modulus(w))
-
-
-def _compression(material: Material, w: Complex) -> Complex:
-    """Modulus lam + 2 mu of compression without lateral strain, Pa."""
-    return _shear(material, w) * (2 - 2 * material.poisson) / (1 - 2 * material.poisson)
-
-
 def _resonance(
-    layers: list[tuple[Material, float]], w: Complex, modulus: Callable[..., Complex]
+    layers: list[tuple[Material, float]], w: Complex, stiffer: Callable[[float], float]
 ) -> Floats:
-    """w^2 sum_n 1 / w_n^2 over the resonances w_n across layers on a rigid base."""
+    """w^2 sum_n 1 / w_n^2 over the resonances w_n across layers on a rigid base; a function of
+    Poisson's ratio gives their modulus over that of shear.
+    """
     above, total = 0.0, np.zeros(len(w))
     for material, thickness in layers:
-        mass = material.density * thickness
-        total += np.abs(w**2 / modulus(material, w)) * thickness * (above + mass / 2)
+        mass, modulus = material.density * thickness, material.complex_modulus(w)
+        softness = np.abs(w**2 / (modulus * stiffer(material.poisson)))
+        total += softness * thickness * (above + mass / 2)
         above += mass
     return total
 
 
 def _decay(stack: Stack, w: Complex, weakest: float = 0.1) -> Floats:
     """Smallest decay (f,) in 1/m of shear waves; `weakest` of the mean if a layer is lossless."""
-    waves = [np.sqrt(m.density * w**2 / _shear(m, w)) for m in stack.materials]
+    waves = [np.sqrt(m.density * w**2 / m.complex_modulus(w)) for m in stack.materials]
     decay = np.abs(np.imag(waves))
     finite = [thickness for thickness in stack.thicknesses if isfinite(thickness)]
     share = np.minimum(stack.thicknesses, sum(finite))  # a half-space counts as all above it
@@ -230,7 +225,7 @@ def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
 
 def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex) -> Layer:
     """Stiffness (f, k) of a layer of a thickness in m, inf for a half-space."""
-    mu, kappa = _shear(material, w), (0.5 - material.poisson) / (1 - material.poisson)
+    mu, kappa = material.complex_modulus(w), (0.5 - material.poisson) / (1 - material.poisson)
     k2, ks2, over_k = k * k, material.density * w**2 / mu, 1 / k
     p, s = np.sqrt(k2 - kappa * ks2), np.sqrt(k2 - ks2)
     over_p, over_s, over_sum = 1 / p, 1 / s, 1 / (p + s)

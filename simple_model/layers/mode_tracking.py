@@ -46,11 +46,11 @@ def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots
     """
     count = len(omega)
     index = np.full((count, 0), -1)
-    longest_gap = 3  # frequencies without a root, near which a mode may begin to leak
     for f in range(count):
         known = np.flatnonzero(np.isfinite(roots.squared[f]))
         latest = np.where(index >= 0, np.arange(count)[:, None], -1).max(axis=0, initial=-1)
-        alive = np.flatnonzero(f - latest <= 1 + longest_gap)
+        # Near the frequency at which a mode begins to leak, up to three have no root.
+        alive = np.flatnonzero(f - latest <= 1 + 3)
         last = index[latest[alive], alive]
         costs, matches = _matches(roots, omega, (latest[alive], last), (f, known))
         pairs = [
@@ -66,8 +66,7 @@ def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots
     index = index[:, (index >= 0).any(axis=0)]
     roots = roots.apply(lambda values: values[returned])
     decay = np.abs(roots.wavenumbers.imag)
-    round_off = 1e-9  # of a wavenumber: smaller imaginary parts are 0
-    decay = np.where(decay > round_off * np.abs(roots.wavenumbers), decay, 0.0)
+    decay = np.where(decay > 1e-9 * np.abs(roots.wavenumbers), decay, 0.0)
     least = np.where(index >= 0, _at(decay, index), np.inf).min(axis=0)
     slowness = np.where(decay == 0, np.abs(roots.wavenumbers.real) / omega[returned, None], 0.0)
     slowest = np.where(index >= 0, _at(slowness, index), 0.0).max(axis=0)
@@ -89,8 +88,7 @@ def frequencies_between(roots: Roots, omega: Floats, waves: Bools, most: int) ->
     """
     further = []
     sure, rival = 0.06, 0.15  # largest misfit of a safe match; least misfit of its rivals
-    narrow = 1.05  # ratio of two frequencies between which no mode is lost
-    for f in np.flatnonzero(omega[1:] > narrow * omega[:-1]).tolist():
+    for f in np.flatnonzero(omega[1:] > 1.05 * omega[:-1]).tolist():  # others lose no mode
         here, there = (np.flatnonzero(np.isfinite(roots.squared[g])) for g in (f, f + 1))
         costs, pairs = _matches(roots, omega, (np.full(len(here), f), here), (f + 1, there))
         is_sure = np.zeros(costs.shape, bool)
@@ -150,5 +148,4 @@ def _misfit(
     a, b = (x.reshape(len(x), roots.shapes[0, 0].size)
             for x in (roots.shapes[f, m], roots.shapes[g, n]))  # fmt: skip
     a, b = (x / np.maximum(np.linalg.norm(x, axis=1), 1e-300)[:, None] for x in (a, b))
-    shape_weight = 0.1  # of unlike shapes in the misfit
-    return np.asarray(missed + shape_weight * (1 - np.abs(a.conj() @ b.T)))
+    return np.asarray(missed + 0.1 * (1 - np.abs(a.conj() @ b.T)))

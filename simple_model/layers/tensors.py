@@ -29,7 +29,10 @@ def energy_root(material: Material) -> Floats:
 
 def largest_shear(strain: Floats) -> Floats:
     """Largest engineering shear strain (...) of strains (..., 6), e_1 - e_3."""
-    principal = np.linalg.eigvalsh(_matrices(strain))
+    matrices = np.empty((*strain.shape[:-1], 3, 3))
+    for c, (i, j) in enumerate(TENSOR):
+        matrices[..., i, j] = matrices[..., j, i] = strain[..., c]
+    principal = np.linalg.eigvalsh(matrices)
     return np.asarray(principal[..., 2] - principal[..., 0])
 
 
@@ -37,16 +40,3 @@ def von_mises(stress: Floats) -> Floats:
     """Von Mises stress (...) of stresses (..., 6): (3/2 s : s)^(1/2) of the deviator s."""
     deviator = stress - stress @ MEAN
     return np.sqrt(1.5 * np.maximum((TWICE * deviator**2).sum(axis=-1), 0.0))
-
-
-def sum_of_squares(values: Floats) -> Floats:
-    """Sum of the squares (...) of values (..., c)."""
-    return np.asarray((values**2).sum(axis=-1))
-
-
-def _matrices(tensor: Floats) -> Floats:
-    """Symmetric matrices (..., 3, 3)."""
-    matrices = np.empty((*tensor.shape[:-1], 3, 3))
-    for c, (i, j) in enumerate(TENSOR):
-        matrices[..., i, j] = matrices[..., j, i] = tensor[..., c]
-    return matrices

@@ -16,8 +16,8 @@ ROLES = ("modulation", "envelope")
 
 
 def between(knots: Floats, t: Floats, after: Floats) -> tuple[Ints, Floats]:
-    """Index (...) of the last rising knot (k,) at times `after` (...), and the fraction (...) of
-    the way from it to the next at times t (...).
+    """Index (...) of the last of rising knots (k,) that is not later than times `after` (...), and
+    the fraction (...) of the way from it to the next knot at times t (...).
     """
     before = np.minimum(np.searchsorted(knots, after, side="right") - 1, len(knots) - 2)
     step = np.maximum(knots[before + 1] - knots[before], 1e-300)
