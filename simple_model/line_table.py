@@ -7,13 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simple_model.load.line_names import (
-    SAME_LINE,
-    WEAKEST,
-    LineNames,
-    during_pulses,
-    line_names,
-)
+from simple_model.load.line_names import SAME_LINE, WEAKEST, LineNames, during_pulses, line_names
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
 from simple_model.load.spectrum import load_lines

@@ -210,10 +210,7 @@ def _check_frequencies(f: Floats) -> None:
     outside = ((f < lowest) | (f > highest)) & ~((f == 0) & (np.arange(len(f)) == 0))
     for wrong, problem in (
         (outside, f"which is outside {lowest:g} to {highest:g} Hz; only the first may be 0"),
-        (
-            np.diff(f, prepend=-1.0) <= 0,
-            "which does not rise; give frequencies in ascending order",
-        ),
+        (np.diff(f, prepend=-1.0) <= 0, "which does not rise; give frequencies in ascending order"),
     ):
         if wrong.any():
             raise ValueError(
