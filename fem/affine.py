@@ -17,7 +17,7 @@ Poisson's ratios are fixed, so the projections of the A_q onto one basis serve e
 (Prud'homme et al., J Fluids Eng 124:70 (2002)). `operators_of` sums them for given materials.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,8 +36,6 @@ from fem.transient import Diverged
 from fem.typing import Complex, Floats, Ints
 from meshes import TetMesh
 from simple_model.layers.material import Material
-
-RESTART, CYCLES = 60, 5  # of GMRES
 
 Terms = tuple[tuple[str, int], ...]
 
@@ -156,8 +154,7 @@ def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
 
     rho, mu = (property_of(materials, name) for name in ("density", "shear_modulus"))
     R = summed(
-        dashpots=[m.density * m.shear_speed for m in solids.materials],
-        layer=solids.drag * rho,
+        dashpots=[m.density * m.shear_speed for m in solids.materials], layer=solids.drag * rho
     )
     branches = (
         MaxwellBranch(K=summed(stiffness=share * mu), time=time)
@@ -216,6 +213,8 @@ def line_solution(
     *,
     solver: str = "auto",
     fluid_share: float = 0.0,
+    restart: int = 60,
+    cycles: int = 5,
 ) -> Complex:
     """Return the steady state (n_free,) of a full body at one line, in m, for `weights` (q,) of its
     matrices and a force (n_free,) in N.
@@ -223,7 +222,8 @@ def line_solution(
     The operators F of air can only be applied. P = A - sum w F + E is factorised, where E is the
     equivalent added mass of the bending waves of this line, `fluid_share` of the body's own mass.
     Waves with other wavenumbers do not resonate, so P^-1 (P + sum w F - E) is near the identity and
-    GMRES needs few iterations. Raises Diverged if GMRES does not converge.
+    GMRES needs few iterations. Raises Diverged if it does not converge in some `cycles` of
+    `restart` iterations.
     """
     dry = affine.in_vacuum()
     is_mass = np.array([kind == "mass" for kind, _ in dry.terms])
@@ -234,14 +234,7 @@ def line_solution(
     if not len(around):
         return factor.solve(force)
     E = fluid_share * sum(w * M for w, M in zip(own[is_mass], dry.of("mass"), strict=True))
-    air = zip(around, affine.parts[len(is_mass) :], strict=True)
-    return _solve_with_air(factor.solve, list(air), E, force)
-
-
-def _solve_with_air(
-    solve: Callable[[Complex], Complex], air: Sequence[tuple[complex, Any]], E: Any, force: Complex
-) -> Complex:
-    """Solve P u + sum w F u - E u = force, where `solve` solves with P."""
+    solve, air = factor.solve, list(zip(around, affine.parts[len(is_mass) :], strict=True))
 
     def preconditioned(u: Complex) -> Complex:
         parts = np.column_stack([u.real, u.imag])  # F takes real fields
@@ -250,10 +243,10 @@ def _solve_with_air(
     n = len(force)
     system = LinearOperator((n, n), matvec=preconditioned, dtype=np.complex128)
     residual = 1e-8  # relative, of GMRES; a resonance amplifies it about a hundred times
-    u, failed = gmres(system, solve(force), rtol=residual, restart=RESTART, maxiter=CYCLES)
+    u, failed = gmres(system, solve(force), rtol=residual, restart=restart, maxiter=cycles)
     if failed:
         raise Diverged(
-            f"GMRES did not reach a residual of {residual:g} in {RESTART * CYCLES} iterations for "
+            f"GMRES did not reach a residual of {residual:g} in {restart * cycles} iterations for "
             "a sheet in air; use a smaller sheet or larger elements, or air = false"
         )
     return np.asarray(u, np.complex128)

@@ -15,8 +15,6 @@ from fem.affine import AffineOperators, Solids, Terms, operators_of
 from fem.assembly import Operators
 from fem.typing import Array, Complex, Floats
 
-WEAK_LINE_RATIO = 1e-2  # of the strongest line: errors of weaker lines are relative to this
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AffineModel:
@@ -76,10 +74,17 @@ def interpolate(model: AffineModel, shares: Floats) -> AffineOperators:
     return AffineOperators(terms=model.terms, parts=parts, free=np.arange(r), n_dofs=r)
 
 
+def least_scale(strengths: Floats, weak: float = 1e-2) -> float:
+    """Return the smallest scale of errors of lines with some strengths (f,): the share `weak` of
+    the strongest.
+    """
+    return float(max(weak * strengths.max(), np.finfo(np.float64).tiny))
+
+
 def line_errors(candidate: Complex, reference: Complex) -> Floats:
     """Return relative errors (f,) of lines (f, p): norms over the outputs, relative to each line or
-    to `WEAK_LINE_RATIO` of the strongest, whichever is larger.
+    to the `least_scale`, whichever is larger.
     """
-    strength = np.linalg.norm(reference, axis=1)
-    least = max(WEAK_LINE_RATIO * strength.max(), np.finfo(np.float64).tiny)
-    return np.asarray(np.linalg.norm(candidate - reference, axis=1) / np.maximum(strength, least))
+    strengths = np.linalg.norm(reference, axis=1)
+    scales = np.maximum(strengths, least_scale(strengths))
+    return np.asarray(np.linalg.norm(candidate - reference, axis=1) / scales)

@@ -24,6 +24,7 @@ import numpy as np
 from scipy import fft, linalg, sparse
 from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
+from fem.plane_stiffness import SIDES
 from fem.sparsity import dofs_of, from_entries
 from fem.typing import Floats, Ints
 from meshes import MeshError, TetMesh, facet_set
@@ -31,7 +32,6 @@ from simple_model.layers.compliance import AIR_VISCOSITY
 from simple_model.load.focus import SPEED_OF_SOUND as C
 from simple_model.plates.air import edge_functions, open_air
 
-FLAT = np.eye(3)[:2]
 RESISTANCES = {"friction": 0.5, "monopole": 2.0, "dipole": 4.0}  # powers of angular frequency
 
 
@@ -51,7 +51,7 @@ def air_around(
     density: float,
     *,
     frame: float = np.inf,
-    axes: Floats = FLAT,
+    axes: Floats = SIDES,
     mirrored: str = "",
     facets: str | Ints = "top",
 ) -> Air:
@@ -95,9 +95,9 @@ def air_around(
     spare = 6  # functions of this pressure on the sheet more than the wavenumber requires
     if frame == np.inf:
         pressure = _pressure_in_baffle(shape, (dy, dx), images[::-1], density)
-        moments = {"monopole": [np.ones((len(y), len(x)))], "dipole": []}
-        moments["dipole"] += [] if images[0] else [np.tile(x, (len(y), 1))]
-        moments["dipole"] += [] if images[1] else [np.tile(y[:, None], (1, len(x)))]
+        along = [] if images[0] else [np.tile(x, (len(y), 1))]
+        along += [] if images[1] else [np.tile(y[:, None], (1, len(x)))]
+        moments = {"monopole": [np.ones((len(y), len(x)))], "dipole": along}
         rates = {"monopole": density / np.pi / C, "dipole": density / (3 * np.pi * C**3)}
     else:
         sizes = [
@@ -175,9 +175,7 @@ def _pressure_in_baffle(
 
 
 def near_field(
-    shape: tuple[int, int],
-    spacing: tuple[float, float],
-    mirrored: Sequence[bool] = (False, False),
+    shape: tuple[int, int], spacing: tuple[float, float], mirrored: Sequence[bool] = (False, False)
 ) -> Callable[[Floats], Floats]:
     """Return a function that computes int w(y) / |x - y| dA of fields w (k, ny, nx) at the nodes of
     a grid with shape (ny, nx) and spacing (dy, dx) in m. `mirrored` adds the mirror images about

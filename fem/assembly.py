@@ -42,14 +42,7 @@ from fem.plane_stiffness import (
     tension_stiffness,
 )
 from fem.pressure_projection import projected_divergence
-from fem.sparsity import (
-    UPPER,
-    SparsityPattern,
-    in_each_direction,
-    restrict,
-    select,
-    slabs,
-)
+from fem.sparsity import UPPER, SparsityPattern, in_each_direction, restrict, select, slabs
 from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
 from simple_model.layers.material import Material

@@ -60,11 +60,7 @@ def springs(mesh: TetMesh, support: Support) -> sparse.csr_array:
 
 
 def dashpots(
-    mesh: TetMesh,
-    nodes: Ints,
-    materials: list[Material],
-    region: Ints,
-    share: Floats | None = None,
+    mesh: TetMesh, nodes: Ints, materials: list[Material], region: Ints, share: Floats | None = None
 ) -> sparse.csr_array:
     """Return the Lysmer-Kuhlemeyer damping (3 n, 3 n) in N s/m of absorbing facets (e, a).
 
@@ -98,7 +94,7 @@ def _nonzero_facets(nodes: Ints, values: Floats) -> tuple[Ints, Floats]:
 
 def _over_facets(mesh: TetMesh, nodes: Ints, traction: Floats) -> sparse.csr_array:
     """Return int N_a t_ij N_b dA (3 n, 3 n) of t (k, q, i, j) at the points of facets (k, a)."""
-    N, normals = facet_geometry(mesh, nodes)
+    N, normals = facet_geometry(mesh.points[nodes])
     area = np.linalg.norm(normals, axis=2)
     local = np.einsum("eq,eqij,qa,qb->eaibj", area, traction, N, N, optimize=True)
     dofs = dofs_of(nodes)

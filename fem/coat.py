@@ -33,14 +33,13 @@ from scipy import sparse
 from fem.boundary import owners
 from fem.combination import viscoelastic
 from fem.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions, triangle_rule
-from fem.load_and_probe import facet_areas
+from fem.load_and_probe import facet_geometry
 from fem.maxwell import Matrices, property_of
 from fem.sparsity import dofs_of, from_entries
 from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
 from simple_model.layers.material import Material
 
-QUADRATIC = 6  # nodes of a facet
 STATIONS, STATION_WEIGHTS = np.polynomial.legendre.leggauss(2)  # through each layer, along edges
 
 
@@ -120,21 +119,17 @@ def surface_of(mesh: TetMesh, coat: Coat, fixed: Bools) -> Surface:
     where `fixed` (3 n,) holds the direction across it.
     """
     of_mesh = facet_set(mesh, coat.facets)
-    if of_mesh.shape[1] != QUADRATIC:
-        raise ValueError(
-            f"facets of a coat have {of_mesh.shape[1]} nodes and need {QUADRATIC}; make the mesh "
-            "with order=2"
-        )
+    if (a := of_mesh.shape[1]) != 6:
+        raise ValueError(f"facets of a coat have {a} nodes and need 6; make the mesh with order=2")
     nodes, facets = np.unique(of_mesh, return_inverse=True)
     facets, points = facets.reshape(of_mesh.shape), mesh.points[of_mesh]
     at_nodes = np.vstack([np.eye(3), np.eye(3)[TRIANGLE_EDGES].mean(axis=1)])
-    slopes = np.broadcast_to(shape_derivatives(at_nodes, QUADRATIC), (len(facets), 6, 6, 2))
+    slopes = np.broadcast_to(shape_derivatives(at_nodes, a), (len(facets), a, a, 2))
     tangents, normals = _frames(points, slopes)
-    size = 3 * QUADRATIC
     turn = -np.einsum("eaid,eabd,eaj->eaibj", np.linalg.pinv(tangents), slopes, normals)
     return Surface(
         nodes=nodes, facets=facets, points=points, normals=normals,
-        turn=turn.reshape(-1, size, size),
+        turn=turn.reshape(-1, 3 * a, 3 * a),
         edges=_edges(facets, points, fixed.reshape(-1, 3)[of_mesh]),
     )  # fmt: skip
 
@@ -160,7 +155,7 @@ def _edges(facets: Ints, points: Floats, fixed: Bools) -> Edges:
     s = np.where((ends[:, 0] < ends[:, 1])[:, None], STATIONS, -STATIONS)[..., None]
     start, end = np.eye(3)[TRIANGLE_EDGES[k]].swapaxes(0, 1)[:, :, None]
     at = ((1 - s) * start + (1 + s) * end) / 2
-    slopes = shape_derivatives(at.reshape(-1, 3), QUADRATIC).reshape(*at.shape[:2], QUADRATIC, 2)
+    slopes = shape_derivatives(at.reshape(-1, 3), 6).reshape(*at.shape[:2], 6, 2)
     tangents, normals = _frames(points[facet], slopes)
     along = np.einsum("hd,hqdi->hqi", (end - start)[:, 0, 1:], tangents)
     length = np.linalg.norm(along, axis=2)
@@ -277,18 +272,14 @@ def coat_mass(surface: Surface, coat: Coat, density: Floats) -> sparse.csr_array
     N = shape_functions(triangle_rule()[0], facets.shape[1])
     local = np.zeros((*facets.shape, facets.shape[1]))
     for z, weight, layer in zip(*coat.stations, strict=True):
-        normals = facet_areas(surface.points + z * surface.normals)[1]
+        normals = facet_geometry(surface.points + z * surface.normals)[1]
         area = weight * density[layer][:, None] * np.linalg.norm(normals, axis=2)
         local += np.einsum("eq,qa,qb->eab", area, N, N, optimize=True)
     return _sum_elements(np.einsum("eab,ij->eaibj", local, np.eye(3)), facets, len(surface.nodes))
 
 
 def coat_operators(
-    mesh: TetMesh,
-    coat: Coat,
-    materials: list[Material],
-    region: Ints,
-    fixed: Bools,
+    mesh: TetMesh, coat: Coat, materials: list[Material], region: Ints, fixed: Bools
 ) -> Matrices:
     """Return what a coat adds to K, C, M and the branches of a body, on all dofs of its mesh.
 

@@ -30,8 +30,6 @@ from fem.typing import Floats, Ints
 from meshes import MeshError, TetMesh
 from simple_model.layers.material import Material
 
-LARGEST_POISSON = 0.45  # beyond it elements lock, as their dilatation is not projected here
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Membrane:
@@ -105,8 +103,8 @@ def finite_strain(
     Raises
     ------
     ValueError
-        If a Poisson's ratio exceeds `LARGEST_POISSON`, or a material has its own modulus law; and
-        the errors of `assemble`.
+        If a Poisson's ratio exceeds 0.45, or a material has its own modulus law; and the errors of
+        `assemble`.
     """
     n = len(mesh.points)
     parts = [solid_part(mesh, material)]
@@ -119,34 +117,32 @@ def finite_strain(
     def spread(u: Floats) -> Floats:
         return operators.expand(u).reshape(n, 3)
 
-    def viscous(u: Floats, v: Floats) -> Floats:
-        return linear.C @ v
-
+    viscous = Elastic.linear(linear).viscous
     if membrane is not None:
         part, (lag, times, shares) = membrane_part(mesh, membrane), losses(membrane.material)
         parts.append(part)
         K = restrict(tangent(part, np.zeros((n, 3))), free)
-        branches = (
-            MaxwellBranch(K=share * K, time=time)
-            for share, time in zip(shares.tolist(), times.tolist(), strict=True)
-        )
+        each = zip(shares.tolist(), times.tolist(), strict=True)
+        branches = (MaxwellBranch(K=share * K, time=time) for share, time in each)
         operators = replace(
             linear, K=linear.K + K, C=linear.C + lag * K, laws=None,
             branches=(*linear.branches, *branches),
         )  # fmt: skip
+
+        def relaxing_force(u: Floats, d: Floats) -> Floats:
+            return stress_force(part, spread(u), np.tensordot(shares, d, 1)).ravel()[free]
+
+        def viscous(u: Floats, v: Floats) -> Floats:
+            return linear.C @ v + lag * rate_force(part, spread(u), spread(v)).ravel()[free]
+
         stretched = Relaxing(
             times=times,
             strain=lambda u: deformation(part, spread(u))[1],
-            force=lambda u, d: stress_force(part, spread(u), np.tensordot(shares, d, 1)).ravel()[
-                free
-            ],
+            force=relaxing_force,
             tangent=lambda u, x: shares @ x * restrict(tangent(part, spread(u)), free),
             energy=lambda d: shares * np.array([strain_energy(part, e) for e in d]),
         )
         relaxing = (*relaxing, stretched) if len(times) else relaxing
-
-        def viscous(u: Floats, v: Floats) -> Floats:
-            return linear.C @ v + lag * rate_force(part, spread(u), spread(v)).ravel()[free]
 
     return Elastic(
         operators=operators,
@@ -175,11 +171,12 @@ def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Pa
     """Return the tetrahedra of a mesh."""
     given, region = by_region(mesh, material)
     materials = [m.without_loss_factor() for m in given]
+    largest = 0.45  # because the dilatation is not projected here
     for m in materials:
-        if m.poisson > LARGEST_POISSON:
+        if m.poisson > largest:
             raise ValueError(
-                f"poisson is {m.poisson}, but elements at large displacement lock above "
-                f"{LARGEST_POISSON}; use the linear model fem"
+                f"poisson is {m.poisson}, but elements at large displacement lock above {largest}; "
+                "use the linear model fem"
             )
     lam, mu = np.array([(m.first_lame, m.shear_modulus) for m in materials])[region].T
     G, volume = gradients(shape_nodes(mesh), mesh.tets.shape[1], 2, 0)
@@ -320,11 +317,7 @@ def _plane_strains(G: Floats, F: Floats) -> Floats:
 
 
 def shell_stiffness(
-    mesh: TetMesh,
-    membrane: Membrane,
-    slopes: Callable[[Floats], Floats],
-    *,
-    meshed: float = 0.0,
+    mesh: TetMesh, membrane: Membrane, slopes: Callable[[Floats], Floats], *, meshed: float = 0.0
 ) -> sparse.bsr_array:
     """Return the membrane stiffness (3 n, 3 n) in N/m of a shallow shell, a slightly curved sheet.
 

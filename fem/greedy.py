@@ -23,17 +23,15 @@ from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
 from fem.affine import AffineOperators, Solids, line_solution, operators_of, project, weights
 from fem.affine_model import (
-    WEAK_LINE_RATIO,
     AffineModel,
     interpolate,
+    least_scale,
     line_errors,
     steady_outputs,
     steady_states,
 )
 from fem.krylov import reduce
 from fem.typing import Array, Complex, Floats, Ints
-
-DEPENDENT = 1e-10  # remainder of a direction outside a basis, or its square, that is round-off
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,7 +108,8 @@ def reduce_affine(
         errors = {}
         for t, k, near, least in _suspects(model, training, others, frequencies, smaller):
             exact = _outputs(model, training[t], frequencies, k, solver)
-            errors[t] = _norm(near - exact) / max(_norm(exact), least)
+            error, size = (float(np.linalg.norm(x)) for x in (near - exact, exact))
+            errors[t] = error / max(size, least)
         checked += len(errors)
         t = max(errors, key=lambda each: errors[each], default=t)
         if not errors or errors[t] <= tolerance:
@@ -170,7 +169,7 @@ def _suspects(
         now = lines(t, watched)
         change = line_errors(lines(t, watched, smaller), now)
         k = int(np.argmax(change))
-        least = WEAK_LINE_RATIO * float(np.linalg.norm(now, axis=1).max())
+        least = least_scale(np.linalg.norm(now, axis=1))
         changes.append((float(change[k]), (t, int(watched[k]), now[k], least)))
     changes.sort(key=lambda each: -each[0])
     visited = set[tuple[float, ...]]()
@@ -216,7 +215,7 @@ def _join(basis: Floats, more: Floats, M: LinearOperator) -> Floats:
     for _ in range(2):
         new = new - basis @ (basis.T @ (M @ new))
         squares, directions = np.linalg.eigh(new.T @ (M @ new))
-        is_new = squares > DEPENDENT * squares.max(initial=0.0)
+        is_new = squares > 1e-10 * squares.max(initial=0.0)  # the others are round-off
         new = new @ (directions[:, is_new] / np.sqrt(squares[is_new]))
     return np.hstack([basis, new])
 
@@ -226,10 +225,6 @@ def _loss(solids: Solids) -> float:
     loss_frequency = 2 * np.pi * 200.0  # rad/s, where losses are compared
     moduli = np.array([m.complex_modulus(loss_frequency) for m in solids.materials])
     return float((moduli.imag / moduli.real).sum())
-
-
-def _norm(vector: Complex) -> float:
-    return float(np.linalg.norm(vector))
 
 
 def line_bases(
@@ -295,7 +290,7 @@ def _extend(basis: AffineModel, state: Complex, model: AffineModel, line: int) -
     W, new = basis.basis, state / np.linalg.norm(state)
     for _ in range(2):
         new = new - W @ (W.conj().T @ new)
-    if (size := np.linalg.norm(new)) < DEPENDENT:
+    if (size := np.linalg.norm(new)) < 1e-10:  # round-off
         return basis
     new = new / size
     W = np.column_stack([W, new])

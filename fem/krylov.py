@@ -39,8 +39,6 @@ from fem.reduced import ReducedModel
 from fem.typing import Complex, Floats
 
 EXPANSION_POINT = 2 * np.pi * 200.0  # rad/s: about 4.5 times the lowest natural frequency is best
-MOST_MOMENTS = 200
-SMALLEST = np.finfo(np.float64).tiny
 
 
 class NotReduced(ValueError):
@@ -58,6 +56,7 @@ def reduce(
     weighted: bool = False,
     rate: int = 0,
     point: float = EXPANSION_POINT,
+    most_moments: int = 200,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> ReducedModel:
@@ -79,6 +78,7 @@ def reduce(
     rate : order of the time derivative of the response that is meant, 1 for velocity
     point : expansion point, rad/s. Ignored with `air`, and with Maxwell branches, where the band
         sets it
+    most_moments : largest number of moments
     solver : backend of `factorise`
     progress : called with the fraction done as the error estimate approaches the tolerance
 
@@ -115,9 +115,9 @@ def reduce(
     report(0.0)
 
     independent, directions = _independent(start_vectors)
-    space = KrylovBasis(operators, laws, independent.shape[1] * (MOST_MOMENTS + 1))
+    space = KrylovBasis(operators, laws, independent.shape[1] * (most_moments + 1))
     rows = start_vectors if loads is None else np.hstack([start_vectors, loads[free]])
-    growing = _moments(space, operators, laws, point, factor, independent)
+    growing = _moments(space, operators, laws, point, factor, independent, most_moments)
     moments, size, estimate = _iterate(
         space, rows, directions, band, tolerance, growing, report, weighted, rate
     )
@@ -127,10 +127,8 @@ def reduce(
     K, C, M, branches = space.model(size)
     basis = space.on_all_dofs(size)
     if air is not None:
-        of_free = basis[free]
-        C = C + damping(
-            K, M, {name: of_free.T @ (R @ of_free) for name, R in air.resistances.items()}
-        )
+        V = basis[free]
+        C = C + damping(K, M, {name: V.T @ (R @ V) for name, R in air.resistances.items()})
     small = Operators(
         K=K.copy(), C=C.copy(), M=M, R=space.radiation(operators.R, size), branches=branches,
         free=np.arange(size), n_dofs=size,
@@ -223,7 +221,8 @@ class KrylovBasis:
         """
         M, Q = self._M, self.basis
         product = M @ block
-        scale = _norms(block, product)
+        tiny = np.finfo(np.float64).tiny
+        scale = np.maximum(np.sqrt(np.einsum("nm,nm->m", block, product)), tiny)  # mass norms
         first = _inner(Q, product)
         block = block - _combine(Q, first)
         # Once is not enough: after 90 moments vectors would be orthogonal to 1e-3 only.
@@ -237,7 +236,7 @@ class KrylovBasis:
         inverse = np.divide(1, size, out=np.zeros_like(size), where=size > round_off * scale)
         squares, directions = np.linalg.eigh(gram * np.outer(inverse, inverse))
         dependent = 1e-10  # squared sine below which a direction is not new
-        distinct = squares > max(dependent * squares.max(), SMALLEST)
+        distinct = squares > max(dependent * squares.max(), tiny)
         squares, directions = squares[distinct], directions[:, distinct]
         upright = inverse[:, None] * directions / np.sqrt(squares)
         alike = 1e-6  # squared sine below which directions are orthonormalised once more
@@ -298,13 +297,12 @@ def _iterate(
             continue
         at = moments
         space.project(rows, size)
-        now = _band_response(space, probes, coarse, size) * np.abs(coarse[:, None, None]) ** rate
+        now = _band_response(space, probes, coarse, size, rate)
         if response is not None:
             error = np.hypot(_largest_change(response, now, weighted), left)
             if error <= tolerance:
                 earlier, latest = (
-                    _band_response(space, probes, fine, each) * np.abs(fine[:, None, None]) ** rate
-                    for each in (before[1], size)
+                    _band_response(space, probes, fine, each, rate) for each in (before[1], size)
                 )
                 error = np.hypot(_largest_change(earlier, latest, weighted), left)
             if weighted:
@@ -319,7 +317,7 @@ def _iterate(
                 return *before, error
         before, response = (moments, size), now
     raise NotReduced(
-        f"the reduced-order model of {MOST_MOMENTS} moments has a relative error of {error:.2g}, "
+        f"the reduced-order model of {moments} moments has a relative error of {error:.2g}, "
         f"above the tolerance {tolerance:g}; raise the tolerance, narrow the band or add damping"
     )
 
@@ -356,8 +354,9 @@ def _moments(
     point: float,
     factor: Factor,
     start_vectors: Floats,
+    most: int,
 ) -> Iterator[tuple[int, int]]:
-    """Extend the space moment by moment; yield the numbers of moments and of vectors."""
+    """Extend the space by up to `most` moments; yield the numbers of moments and of vectors."""
     branches = maxwell_only(operators.branches)
     lags = [branch.time / (1 + point * branch.time) for branch in branches]
     factors = factors_at(branches, point)
@@ -368,7 +367,7 @@ def _moments(
     upper = space.extend(factor.solve(start_vectors))
     relaxed = [(1 - point * lag) * upper for lag in lags]
     latest = np.stack([upper, np.zeros_like(upper), *relaxed])
-    for moment in range(1, MOST_MOMENTS + 1):
+    for moment in range(1, most + 1):
         yield moment, space.size
         earlier, latest = _orthonormalise(earlier, latest)
         latest = latest[:, :, : space.followed]
@@ -404,11 +403,6 @@ def _inner(basis: Floats, block: Floats) -> Floats:
     return products.T
 
 
-def _norms(block: Floats, product: Floats) -> Floats:
-    """Return the mass norms (m,) of columns from their product with M, at least `SMALLEST`."""
-    return np.maximum(np.sqrt(np.einsum("nm,nm->m", block, product)), SMALLEST)
-
-
 def _pad(coordinates: Floats, size: int) -> Floats:
     return np.vstack([coordinates, np.zeros((size - len(coordinates), coordinates.shape[1]))])
 
@@ -416,8 +410,7 @@ def _pad(coordinates: Floats, size: int) -> Floats:
 def _orthonormalise(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
     """Orthonormalise the latest vectors to earlier ones (parts, size, k). Return all, and them."""
     parts, size, width = latest.shape
-    padded = np.zeros((parts, size, earlier.shape[2]))
-    padded[:, : earlier.shape[1]] = earlier
+    padded = np.pad(earlier, ((0, 0), (0, size - earlier.shape[1]), (0, 0)))
     W, X = padded.reshape(parts * size, -1), latest.reshape(parts * size, width)
     X = X / np.linalg.norm(X, axis=0)
     for _ in range(2):
@@ -436,17 +429,13 @@ def _products(A: Any, basis: Floats, vectors: Floats) -> Floats:
 
 def _border(small: Floats, columns: Floats) -> Floats:
     """Border a symmetric matrix by its last columns (r, k) and rows."""
-    r, k = columns.shape
-    whole = np.empty((r, r))
-    whole[: r - k, : r - k] = small
-    whole[:, r - k :] = columns
-    whole[r - k :] = columns.T
-    return whole
+    return np.vstack([np.hstack([small, columns[: len(small)]]), columns.T])
 
 
-def _band_response(space: KrylovBasis, probes: int, s: Complex, size: int) -> Complex:
-    """Return responses (f, k, p) of the probes to the loads, or without loads their fields
-    (f, size, p), at complex frequencies s (f,) in rad/s, in the first vectors of the basis.
+def _band_response(space: KrylovBasis, probes: int, s: Complex, size: int, rate: int) -> Complex:
+    """Return derivatives of order `rate` of the responses (f, k, p) of the probes to the loads, or
+    without loads of their fields (f, size, p), at complex frequencies s (f,) in rad/s, in the first
+    vectors of the basis.
     """
     K, C, M, branches = space.model(size)
     start_vectors, loads = np.split(space.rows(size), [probes], axis=1)
@@ -454,7 +443,8 @@ def _band_response(space: KrylovBasis, probes: int, s: Complex, size: int) -> Co
     fields: Iterator[Any] = (
         np.linalg.solve(dynamic_stiffness(K, C, M, branches, at), start_vectors) for at in s
     )
-    return np.array([loads.T @ x if loads.shape[1] else x for x in fields])
+    response = np.array([loads.T @ x if loads.shape[1] else x for x in fields])
+    return response * np.abs(s[:, None, None]) ** rate
 
 
 def _largest_change(before: Complex, now: Complex, of_all: bool) -> float:

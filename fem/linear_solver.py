@@ -20,7 +20,6 @@ from fem.pardiso import Pardiso, PardisoError, mkl
 from fem.sparsity import on_one_pattern, upper_triangle
 from fem.typing import Array, Ints
 
-SLOWEST = 0.2  # residual over the last one
 BACKENDS = ("pardiso", "superlu")
 
 
@@ -121,7 +120,8 @@ class SumFactoriser:
     PARDISO analyses the union of their patterns once. Factors are in single precision, with
     refinement in double precision, which needs half the memory and two thirds of the time. If
     refinement does not converge, as for thin sheets, this matrix and all later ones are factorised
-    in double precision. `accuracy` is the largest residual over the right-hand side.
+    in double precision. `accuracy` is the largest residual over the right-hand side, `slowest` the
+    largest residual over the last one for which refinement converges.
     """
 
     def __init__(
@@ -130,9 +130,11 @@ class SumFactoriser:
         *,
         backend: str = "auto",
         accuracy: float = 1e-10,
+        slowest: float = 0.2,
     ) -> None:
         self._values, self._indices, self._indptr = on_one_pattern(matrices)
-        self._backend, self._is_single, self._accuracy = backend, True, accuracy
+        self._backend, self._is_single = backend, True
+        self._accuracy, self._slowest = accuracy, slowest
         self._matrix: Pardiso | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -156,10 +158,7 @@ class SumFactoriser:
 
     def _solve(self, matrix: Pardiso, values: Array, b: Array) -> Array:
         if self._is_single:
-            solve = matrix.solve
-            x = _refine(
-                self._upper(values), lambda r: solve(r.astype(np.complex64)), b, self._accuracy
-            )
+            x = _refine(self._upper(values), matrix, b, self._accuracy, self._slowest)
             if x is not None:
                 return x
             self._is_single = False
@@ -177,18 +176,18 @@ class SumFactoriser:
 
 
 def _refine(
-    upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array, accuracy: float
+    upper: sparse.csr_array, single: Pardiso, b: Array, accuracy: float, slowest: float
 ) -> Array | None:
-    """Refine an approximate `solve` of a symmetric matrix; None if that does not converge."""
+    """Refine the solution by a single-precision factor; return None if that does not converge."""
     x, r, size = np.zeros_like(b), b, np.linalg.norm(b, axis=0)
     lower, diagonal, before = upper.T, upper.diagonal().reshape(-1, *[1] * (b.ndim - 1)), size
     while True:
-        x = x + solve(r)
+        x = x + single.solve(r.astype(np.complex64))
         r = b - (upper @ x + lower @ x - diagonal * x)
         now = np.linalg.norm(r, axis=0)
         if (now <= accuracy * size).all():
             return x
-        if not (now <= SLOWEST * before).all():
+        if not (now <= slowest * before).all():
             return None
         before = now
 

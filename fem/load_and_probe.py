@@ -14,9 +14,6 @@ from fem.sparsity import dofs_of, from_entries
 from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
 
-FACET_MARGIN = 1e-6  # barycentric: points this close outside a facet count as on it
-NEWTON_TOLERANCE = 1e-9  # of a facet's size
-
 
 def pressure_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
     """Return the load operator P (3 n, k q): nodal forces in N for pressures in Pa.
@@ -32,20 +29,18 @@ def pressure_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_a
     >>> float(force[2::3].sum().round(9))  # N
     -0.0004
     """
-    N, normals = facet_geometry(mesh, facet_set(mesh, facets))
+    N, normals = facet_geometry(mesh.points[facet_set(mesh, facets)])
     return _forces(mesh, facets, -np.einsum("qa,eqi->eaiq", N, normals))
 
 
-def traction_operator(
-    mesh: TetMesh, tractions: Floats, facets: str | Ints = "top"
-) -> sparse.csr_array:
-    """Return the load operator (3 n, k q) of tractions: nodal forces int N_a t dA in N for values
-    at `facet_points` times the traction vectors (k q, 3).
+def traction_operator(mesh: TetMesh, tractions: Floats) -> sparse.csr_array:
+    """Return the load operator (3 n, k q) of tractions on the top: nodal forces int N_a t dA in N
+    for values at `facet_points` times the traction vectors (k q, 3).
     """
-    N, normals = facet_geometry(mesh, facet_set(mesh, facets))
+    N, normals = facet_geometry(mesh.points[facet_set(mesh, "top")])
     area = np.linalg.norm(normals, axis=2)
     at_points = tractions.reshape(*area.shape, 3)
-    return _forces(mesh, facets, np.einsum("eq,qa,eqi->eaiq", area, N, at_points))
+    return _forces(mesh, "top", np.einsum("eq,qa,eqi->eaiq", area, N, at_points))
 
 
 def _forces(mesh: TetMesh, facets: str | Ints, values: Floats) -> sparse.csr_array:
@@ -71,7 +66,7 @@ def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
 
 def facet_normals(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
     """Return unit normals (k q, 3) out of the body at `facet_points`."""
-    normals = facet_geometry(mesh, facet_set(mesh, facets))[1].reshape(-1, 3)
+    normals = facet_geometry(mesh.points[facet_set(mesh, facets)])[1].reshape(-1, 3)
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
@@ -111,13 +106,11 @@ def probe_operator(
     return _inwards(mesh, *_surface_frame(mesh, points, facets, patch))
 
 
-def node_operator(
-    mesh: TetMesh, facets: str | Ints = "top", *, patch: float = 0.0
-) -> tuple[Ints, sparse.csr_array]:
-    """Return the nodes (s,) of a surface in ascending order, and the operator (s, 3 n) of their
+def node_operator(mesh: TetMesh, *, patch: float = 0.0) -> tuple[Ints, sparse.csr_array]:
+    """Return the nodes (s,) of the top in ascending order, and the operator (s, 3 n) of their
     displacement into the body, against the mean normal of their facets or of a `patch`.
     """
-    nodes = facet_set(mesh, facets)
+    nodes = facet_set(mesh, "top")
     surface, local = np.unique(nodes, return_inverse=True)
     node_places = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])
     if patch:
@@ -138,14 +131,12 @@ def _inwards(mesh: TetMesh, nodes: Ints, N: Floats, normals: Floats) -> sparse.c
     return from_entries(values, rows, dofs_of(nodes), (len(nodes), mesh.n_dofs))
 
 
-def surface_frame(
-    mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
-) -> tuple[Floats, Floats]:
-    """Return places (p, 3) in m on a surface, and unit normals (p, 3) out of the body there.
+def surface_frame(mesh: TetMesh, points: ArrayLike, *, patch: float = 0.0) -> tuple[Floats, Floats]:
+    """Return places (p, 3) in m on the top, and unit normals (p, 3) out of the body there.
 
     Arguments and errors are those of `probe_operator`.
     """
-    nodes, N, normals = _surface_frame(mesh, points, facets, patch)
+    nodes, N, normals = _surface_frame(mesh, points, "top", patch)
     return np.einsum("pa,pai->pi", N, mesh.points[nodes]), normals
 
 
@@ -182,7 +173,7 @@ def _surface_frame(
 
 def _mean_normals(mesh: TetMesh, nodes: Ints, places: Floats, patch: float) -> Floats:
     """Return normals (p, 3) of facets (k, a), averaged by area and distance to places."""
-    at, areas = facet_points(mesh, nodes), facet_geometry(mesh, nodes)[1].reshape(-1, 3)
+    at, areas = facet_points(mesh, nodes), facet_geometry(mesh.points[nodes])[1].reshape(-1, 3)
     at_once = 2_000_000  # pairs of points and facets
     normals, count = np.empty((len(places), 3)), max(1, at_once // len(at))
     for start in range(0, len(places), count):
@@ -200,13 +191,10 @@ def _facet_tangents(mesh: TetMesh, nodes: Ints, barycentric: Floats) -> tuple[Fl
     return tangents[:, 0], tangents[:, 1]
 
 
-def facet_geometry(mesh: TetMesh, nodes: Ints) -> tuple[Floats, Floats]:
-    """Return shape functions (q, a), and outward normals (e, q, i) times area and weight."""
-    return facet_areas(mesh.points[nodes])
-
-
-def facet_areas(places: Floats) -> tuple[Floats, Floats]:
-    """Return the `facet_geometry` of facets with nodes at places (e, a, i)."""
+def facet_geometry(places: Floats) -> tuple[Floats, Floats]:
+    """Return shape functions (q, a), and outward normals (e, q, i) times area and weight, of facets
+    with nodes at places (e, a, i).
+    """
     barycentric, weights = triangle_rule()
     derivatives = shape_derivatives(barycentric, places.shape[1])
     tangents = np.einsum("qad,eai->eqdi", derivatives, places, optimize=True)
@@ -225,20 +213,24 @@ def curved_coordinates(elements: Floats, barycentric: Floats, points: Floats) ->
     return barycentric
 
 
-def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> Bools:
+def on_surface(mesh: TetMesh, points: Floats) -> Bools:
     """Return a mask (p,) of the points (p, 2) in m that `probe_operator` accepts."""
-    return facets_below(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
+    return facets_below(mesh.points[facet_set(mesh, "top")], points)[0] >= 0
 
 
-def facets_below(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
+def facets_below(
+    facets: Floats, points: Floats, *, margin: float = 1e-6, tolerance: float = 1e-9
+) -> tuple[Ints, Floats]:
     """Return the highest of the facets (k, a, 3) below each point (p, 2), or -1, and the
     barycentric coordinates (p, 3) there.
 
     Newton's method must end inside a facet, because shape functions extrapolate without bound on a
-    facet seen edge-on.
+    facet seen edge-on. It ends within a `tolerance` over the facet's size. Points that are closer
+    than a barycentric `margin` outside a facet count as on it.
     """
-    point, facet = _candidates(facets[:, :, :2], points)
-    barycentric, is_on = _facet_coordinates(facets[facet, :, :2], points[point])
+    point, facet = _candidates(facets[:, :, :2], points, margin)
+    barycentric, distance = _facet_coordinates(facets[facet, :, :2], points[point], tolerance)
+    is_on = (distance <= tolerance) & (barycentric.min(axis=1) >= -margin)
     point, facet, barycentric = point[is_on], facet[is_on], barycentric[is_on]
     height = np.einsum(
         "ma,ma->m", shape_functions(barycentric, facets.shape[1]), facets[facet, :, 2]
@@ -251,20 +243,20 @@ def facets_below(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
     last = order[np.append(np.diff(point[order]) > 0, True)[: len(order)]]
     owner, coordinates = np.full(len(points), -1), np.zeros((len(points), 3))
     # Exactly on an edge: nodes off a clamped edge would add round-off to what stays at rest.
-    barycentric = np.where(np.abs(barycentric) < NEWTON_TOLERANCE, 0.0, barycentric)[last]
+    barycentric = np.where(np.abs(barycentric) < tolerance, 0.0, barycentric)[last]
     owner[point[last]] = facet[last]
     coordinates[point[last]] = barycentric / barycentric.sum(axis=1, keepdims=True)
     return owner, coordinates
 
 
-def _candidates(facets: Floats, points: Floats) -> tuple[Ints, Ints]:
+def _candidates(facets: Floats, points: Floats, margin: float) -> tuple[Ints, Ints]:
     """Return pairs (m,) of points (p, 2) and facets (k, a, 2) whose bounding boxes contain them."""
     hull = facets.copy()
     if facets.shape[1] == 6:  # the control points of the edges, which bound curved ones
         corners = facets[:, :3]
         hull[:, 3:] = 2 * facets[:, 3:] - (corners + np.roll(corners, -1, axis=1)) / 2
     low, high = hull.min(axis=1), hull.max(axis=1)
-    slack = FACET_MARGIN * (high - low).max(axis=1, initial=0.0, keepdims=True)
+    slack = margin * (high - low).max(axis=1, initial=0.0, keepdims=True)
     (left, below), (right, above) = (low - slack).T, (high + slack).T
     order = np.argsort(points[:, 0])  # the points of each box by x are neighbours
     first = np.searchsorted(points[order, 0], left, "left")
@@ -279,8 +271,10 @@ def _candidates(facets: Floats, points: Floats) -> tuple[Ints, Ints]:
     return point[by_point], facet[by_point]
 
 
-def _facet_coordinates(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
-    """Return coordinates (m, 3) of points on facets (m, a, 2), and whether each is on it."""
+def _facet_coordinates(facets: Floats, points: Floats, tolerance: float) -> tuple[Floats, Floats]:
+    """Return barycentric coordinates (m, 3) of points in the planes of facets (m, a, 2), and their
+    errors (m,) over the sizes of the facets.
+    """
     coordinates = np.full((len(points), 3), 1 / 3)
     size = np.ptp(facets, axis=1).max(axis=1, initial=0.0)
     distance, active = np.full(len(points), np.inf), np.arange(len(points))
@@ -293,7 +287,7 @@ def _facet_coordinates(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
         area = a * d - b * c
         edge_on = np.abs(area) < edge_on_area * size[active] ** 2
         distance[active[edge_on]] = np.inf
-        going = ~edge_on & (distance[active] > NEWTON_TOLERANCE)
+        going = ~edge_on & (distance[active] > tolerance)
         miss, area = miss[going], area[going]
         second = (d[going] * miss[:, 0] - b[going] * miss[:, 1]) / area
         third = (a[going] * miss[:, 1] - c[going] * miss[:, 0]) / area
@@ -303,8 +297,7 @@ def _facet_coordinates(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
         active = active[largest < newton_reach]
         if not len(active):
             break
-    is_inside = coordinates.min(axis=1) >= -FACET_MARGIN
-    return coordinates, (distance <= NEWTON_TOLERANCE) & is_inside
+    return coordinates, distance
 
 
 def _offsets(elements: Floats, barycentric: Floats, points: Floats) -> tuple[Floats, Floats]:

@@ -20,11 +20,6 @@ from scipy import sparse
 from fem.typing import Floats
 from simple_model.layers.material import Material
 
-NO_INTERNAL_VARIABLES = (
-    "a material with its own modulus law has no internal variables, which motion from rest and "
-    "reduced-order models need; use its Prony series, material.relaxing(), or fem.harmonic"
-)
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MaxwellBranch:
@@ -73,9 +68,18 @@ Matrices = tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Bra
 def maxwell_only(branches: Sequence[Branch]) -> tuple[MaxwellBranch, ...]:
     """Return the branches; raise a ValueError unless each has an internal variable."""
     maxwell = tuple(branch for branch in branches if isinstance(branch, MaxwellBranch))
-    if len(maxwell) < len(branches):
-        raise ValueError(NO_INTERNAL_VARIABLES)
+    refuse_own_law(len(maxwell) < len(branches))
     return maxwell
+
+
+def refuse_own_law(has_own: bool) -> None:
+    """Raise a ValueError if a material has its own modulus law."""
+    if has_own:
+        raise ValueError(
+            "a material with its own modulus law has no internal variables, which motion from rest "
+            "and reduced-order models need; use its Prony series, material.relaxing(), or "
+            "fem.harmonic"
+        )
 
 
 def relaxing_stiffness(branches: Sequence[Branch], s: Any) -> Any:

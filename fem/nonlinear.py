@@ -12,7 +12,7 @@ in the step.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import count
 
 import numpy as np
@@ -21,9 +21,6 @@ from fem.energy import Elastic
 from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged, State, acceleration, at_rest, check_step
 from fem.typing import Floats
-
-MOST_ITERATIONS = 25
-MOST_HALVINGS = 6  # of a load or time step
 
 
 class _Stuck(ArithmeticError):
@@ -36,6 +33,8 @@ def static(
     *,
     start: Floats | None = None,
     tolerance: float = 1e-8,
+    most_iterations: int = 25,
+    most_halvings: int = 6,
     solver: str = "auto",
 ) -> Floats:
     """Return the static displacement under a force, applied in as few load steps as converge.
@@ -47,6 +46,8 @@ def static(
     start : (3 n,) float, m, initial guess; undeformed by default
     tolerance : largest residual relative to the force; or, for residuals below 1e-5, largest
         correction relative to the displacement
+    most_iterations : of Newton's method in a load step
+    most_halvings : of a load step that does not converge
     solver : backend of `factorise`
 
     Returns
@@ -57,7 +58,7 @@ def static(
     Raises
     ------
     Diverged
-        If Newton's method does not converge in steps of 1/64 of the load.
+        If Newton's method does not converge in the smallest load steps.
     """
     operators = body.operators
     free = operators.free
@@ -71,13 +72,13 @@ def static(
             return f - body.internal(u), float(np.linalg.norm(f))
 
         try:
-            u = _newton(body, unbalanced, u, tolerance, solver)
+            u = _newton(body, unbalanced, u, tolerance, most_iterations, solver)
         except _Stuck as stuck:
             part /= 2
-            if part < 0.5**MOST_HALVINGS:
+            if part < 0.5**most_halvings:
                 raise Diverged(
                     f"no equilibrium was found at {100 * target:.3g} % of the load in load steps "
-                    f"of 1/{2**MOST_HALVINGS}: the relative residual is {stuck.args[0]:.2g}, above "
+                    f"of 1/{2**most_halvings}: the relative residual is {stuck.args[0]:.2g}, above "
                     f"{tolerance:g}; lower the load, or refine the mesh where it bends most"
                 ) from None
         else:
@@ -90,11 +91,12 @@ def _newton(
     unbalanced: Callable[[Floats], tuple[Floats, float]],
     u: Floats,
     tolerance: float,
+    most_iterations: int,
     solver: str,
 ) -> Floats:
     residual = np.inf
     round_off = 1e-5  # of the load: a smaller residual is judged by the correction it causes
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(most_iterations):
         r, size = unbalanced(u)
         residual = float(np.linalg.norm(r)) / (size or 1.0)
         if not np.isfinite(residual):
@@ -151,55 +153,50 @@ def dynamic(
     *,
     initial: State | None = None,
     tolerance: float = 1e-3,
+    most_iterations: int = 25,
+    most_halvings: int = 6,
     solver: str = "auto",
 ) -> Iterator[State]:
     """Integrate in time by average acceleration and Newton's method, without end.
 
+    Other arguments, the states and the errors are those of `transient`.
+
     Parameters
     ----------
     body : Elastic
-    force : function of the time in s that returns nodal forces (3 n,) in N
-    dt : float, s, time step
     initial : state with initial displacement and velocity; at rest by default
-    tolerance : float, last Newton correction relative to the displacement of the step
-    solver : backend of `factorise`
-
-    Yields
-    ------
-    State
-        At 0, dt, 2 dt, ...
-
-    Raises
-    ------
-    ValueError
-        If dt is not a finite number above 0.
-    Diverged
-        If a step does not converge even when divided into 64 parts.
+    tolerance : last Newton correction relative to the displacement of the step
+    most_iterations : of Newton's method in a step
+    most_halvings : of a step that does not converge
     """
     check_step(dt)
-    march = _March(body, force, tolerance, solver)
+    march = _March(body, force, tolerance, most_iterations, solver)
     start = initial or at_rest(body.operators.n_dofs)
     now = march.start(start)
     for step in count(1):
         yield march.state(now)
         try:
-            now = march.advance(now, start.time + step * dt)
+            now = march.advance(now, start.time + step * dt, most_halvings)
         except _Stuck as stuck:
             raise Diverged(
                 f"step {step} of dt = {dt:g} s, to t = {start.time + step * dt:g} s, did not "
-                f"converge in {2**MOST_HALVINGS} parts to a tolerance of {tolerance:g}; the "
+                f"converge in {2**most_halvings} parts to a tolerance of {tolerance:g}; the "
                 f"residual is {stuck.args[0]:.2g} of the load; shorten dt or lower the load"
             ) from None
 
 
+@dataclass(frozen=True, eq=False)
 class _March:
-    """Time integration of one body under one load, with its cached factorisations."""
+    """Time integration of one body under one load. `factors` caches a factorisation for each number
+    of halvings that a step may still have.
+    """
 
-    def __init__(
-        self, body: Elastic, force: Callable[[float], Floats], tolerance: float, solver: str
-    ) -> None:
-        self.body, self.force, self.tolerance, self.solver = body, force, tolerance, solver
-        self.factors: dict[int, Factor] = {}  # by the number of halvings of the step
+    body: Elastic
+    force: Callable[[float], Floats]
+    tolerance: float
+    most_iterations: int
+    solver: str
+    factors: dict[int, Factor] = field(default_factory=dict)
 
     def start(self, initial: State) -> _Moment:
         """Return the first moment, with the acceleration that balances the forces."""
@@ -223,16 +220,16 @@ class _March:
             acceleration=expand(now.a), stretch=now.stretch,
         )  # fmt: skip
 
-    def advance(self, now: _Moment, until: float, halvings: int = 0) -> _Moment:
+    def advance(self, now: _Moment, until: float, halvings: int) -> _Moment:
         """Return the state at a time, in one step or, if it does not converge, two halves."""
         try:
             return self._step(now, until, halvings)
         except _Stuck:
             self.factors.pop(halvings, None)
-            if halvings == MOST_HALVINGS:
+            if not halvings:
                 raise
-        middle = self.advance(now, (now.t + until) / 2, halvings + 1)
-        return self.advance(middle, until, halvings + 1)
+        middle = self.advance(now, (now.t + until) / 2, halvings - 1)
+        return self.advance(middle, until, halvings - 1)
 
     def _step(self, now: _Moment, until: float, halvings: int) -> _Moment:
         body, tolerance = self.body, self.tolerance
@@ -244,7 +241,7 @@ class _March:
         load = f + now.force
         slow = 0.3  # ratio of successive corrections above which the tangent is factorised again
         standstill = 1e-6  # of the displacement: smallest scale of a step's correction
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(self.most_iterations):
             u = predicted + dt**2 / 4 * a
             v = now.v + dt / 2 * (now.a + a)
             _, stretch = self._branch_stretches(now, u, shares)

@@ -27,9 +27,6 @@ from fem.typing import Array, Index
 
 log = logging.getLogger(__name__)
 
-TWO_LEVELS, SINGLE, BY_BLOCKS = 23, 27, 36  # indices of its settings
-IN_CORE = 0.8  # of the free memory, at most, for a factor; vectors need the rest
-
 
 class PardisoError(ArithmeticError):
     """PARDISO failed; the message has the number of its error."""
@@ -48,21 +45,27 @@ def mkl() -> ctypes.CDLL | None:
 
 
 class Pardiso:
-    """PARDISO on upper triangles of one pattern, which is analysed once."""
+    """PARDISO on upper triangles of one pattern, which is analysed once.
 
-    def __init__(self, indices: Index, indptr: Index, kind: int, *, single: bool = False) -> None:
-        """Keep columns and row starts, numbered from 1; kind 2 is real, 6 is complex."""
+    `indices` and `indptr` are columns and row starts, numbered from 1; `kind` 2 is real, 6 complex.
+    A factor takes at most the share `in_core` of the free memory; vectors need the rest.
+    """
+
+    def __init__(
+        self, indices: Index, indptr: Index, kind: int, *, single: bool = False,
+        in_core: float = 0.8,
+    ) -> None:  # fmt: skip
         self._indices, self._indptr, self._kind, self._n = indices, indptr, kind, len(indptr) - 1
         self._handle, self._settings = np.zeros(64, np.int64), np.zeros(64, np.int32)
         self._settings[[0, 1, 7]] = 1, 2, 0  # own settings, METIS, no refinement
-        self._settings[[9, TWO_LEVELS]] = 16, 1  # perturbation of pivots
-        self._settings[SINGLE] = single
+        self._settings[[9, 23]] = 16, 1  # perturbation of pivots, factorisation in two levels
+        self._settings[27] = single
         sparse = 0.1  # share of n^2: blocks of denser matrices may crash PARDISO
         blocks = 80  # %: similarity of the patterns of rows that PARDISO orders as a block
         if len(indices) < sparse * self._n**2:
-            self._settings[BY_BLOCKS] = -blocks
+            self._settings[36] = -blocks
         self._values: Array = np.zeros(0)
-        self._scale, self._folders = 1.0, list[str]()
+        self._scale, self._folders, self._in_core = 1.0, list[str](), in_core
         self._analysed, self._environment = False, partial(_environment, None, 0.0)
         state = self._handle, self._settings, kind, self._n
         weakref.finalize(self, _release, *state, self._folders)
@@ -83,14 +86,13 @@ class Pardiso:
         self._analysed = True
         size = 1024.0 * (int(self._settings[15]) + int(self._settings[16]))
         limit = free_memory()
-        if size <= IN_CORE * limit:
+        if size <= self._in_core * limit:
             return
         self._folders.append(_folder(self._n, size, limit))
-        # Out of core, blocks and two levels make some solutions 30 times slower.
         self._run("release")
-        out_of_core = 59  # index of a setting
-        self._settings[[TWO_LEVELS, BY_BLOCKS]], self._settings[out_of_core] = 0, 2
-        self._environment = partial(_environment, self._folders[0], limit)
+        # Out of core (59), two levels and blocks make some solutions 30 times slower.
+        self._settings[[23, 36, 59]] = 0, 0, 2
+        self._environment = partial(_environment, self._folders[0], self._in_core * limit)
         with self._environment():
             self._run("analyse")
 
@@ -162,10 +164,10 @@ def _folder(n: int, size: float, limit: float) -> str:
 
 
 @contextmanager
-def _environment(folder: str | None, limit: float) -> Iterator[None]:
+def _environment(folder: str | None, memory: float) -> Iterator[None]:
     """Set the folder of PARDISO's files, if any, and the memory in bytes that it may use."""
     least_core = 500  # MB of memory that it needs besides the files
-    core = max(least_core, round(IN_CORE * limit / 2**20))
+    core = max(least_core, round(memory / 2**20))
     wanted = {"MKL_PARDISO_OOC_PATH": folder, "MKL_PARDISO_OOC_MAX_CORE_SIZE": str(core)}
     before = {name: os.environ[name] for name in wanted if name in os.environ}
     os.environ.update({name: value for name, value in wanted.items() if folder and value})

@@ -24,21 +24,13 @@ from scipy.sparse.linalg import LinearOperator
 from fem.air import Air, damping
 from fem.assembly import Operators
 from fem.energy import Elastic, Relaxing
-from fem.finite_strain import (
-    Membrane,
-    Part,
-    losses,
-    membrane_part,
-    spread_stress,
-    stress,
-    tangent,
-)
+from fem.finite_strain import Membrane, Part, losses, membrane_part, spread_stress, stress, tangent
 from fem.linear_solver import factorise
 from fem.maxwell import maxwell_only
 from fem.sheet_reading import SheetReading, modal_slopes
-from fem.sparsity import restrict
+from fem.sparsity import dofs_of, restrict
 from fem.static import modes
-from fem.typing import Bools, Floats, Ints
+from fem.typing import Floats, Ints
 from meshes import TetMesh
 from simple_model.layers.material import Material
 
@@ -68,8 +60,7 @@ def stretching_modes(
     progress: Callable[[float], None] | None = None,
 ) -> StretchingModes:
     """Reduce a sheet, given by linear operators and its whole membrane, to its n lowest bending
-    modes; in air, to combinations of them. Raises Diverged if the modes do
-    not converge.
+    modes, or in air to combinations of them. Raises Diverged if the modes do not converge.
     """
     hz, shapes = modes(operators, n, solver=solver)
     of_air = np.zeros((n, n))
@@ -78,15 +69,11 @@ def stretching_modes(
         each = {name: _project(R, shapes[operators.free]) for name, R in air.resistances.items()}
         of_air = damping(np.diag((2 * np.pi * hz) ** 2), np.eye(n), each)
     part = membrane_part(mesh, membrane)
-    w = shapes.reshape(-1, 3, n)[:, 2]
-    slopes = (part.D @ w).reshape(*part.G.shape[:3], n)  # (e, q, k, m)
-    fixed = np.ones(mesh.n_dofs, bool)
-    fixed[operators.free] = False
-    states, left_out = _states_of_stress(part, fixed, slopes, hz, solver)
+    slopes = modal_slopes(part, shapes)
+    states, left_out = _states_of_stress(part, operators.free, slopes, hz, solver)
     H = np.empty((len(states), n, n))
-    weighted = slopes * part.volume[..., None, None]
     for k, s in enumerate(states):
-        H[k] = weighted.reshape(-1, n).T @ (stress(part, s) @ slopes).reshape(-1, n)
+        H[k] = _geometric_stiffness(part, slopes, s)
         if progress:
             progress(k / len(states))
     modal = Operators(
@@ -115,6 +102,14 @@ def _with_added(
 
 def _project(A: Any, shapes: Floats) -> Floats:
     return np.asarray(shapes.T @ (A @ shapes))
+
+
+def _geometric_stiffness(part: Part, slopes: Floats, strain: Floats) -> Floats:
+    """Return the stiffness (m, m) that the stress of a strain (e, q, k, l) adds to bending modes
+    with slopes (e, q, k, m).
+    """
+    S, m = part.volume[..., None, None] * stress(part, strain), slopes.shape[3]
+    return slopes.reshape(-1, m).T @ (S @ slopes).reshape(-1, m)
 
 
 def modal_elastic(modal: Operators, H: Floats, material: Material) -> Elastic:
@@ -176,23 +171,15 @@ def in_plane_matrices(
     f(z) of the stretching e(w, w). It equals -z^T H z / 2, with H for the states of stress of g.
     """
     part = reading.part
-    fixed = np.ones(operators.n_dofs, bool)
-    fixed[operators.free] = False
-    plane = _Plane.of(part, fixed, solver)
-    slopes = modal_slopes(reading, basis).reshape(*part.G.shape[:3], -1)
-    weighted = (slopes * part.volume[..., None, None]).reshape(-1, slopes.shape[3])
+    plane, slopes = _Plane.of(part, operators.free, solver), modal_slopes(part, basis)
     matrices = np.empty((rows.shape[0], *(2 * basis.shape[1:])))
     for k, row in enumerate(rows.toarray()):
-        g = np.zeros(operators.n_dofs)
-        g[plane.moving] = plane.solve(row[plane.moving])
-        slope = (part.D @ g.reshape(-1, 3)[:, :2]).reshape(*part.G.shape[:3], 2)
-        strain = (slope + slope.swapaxes(2, 3)) / 2
-        matrices[k] = -weighted.T @ (stress(part, strain) @ slopes).reshape(weighted.shape)
+        matrices[k] = -_geometric_stiffness(part, slopes, plane.strain_under(row))
     return matrices
 
 
 def _states_of_stress(
-    part: Part, fixed: Bools, slopes: Floats, hz: Floats, solver: str
+    part: Part, free: Ints, slopes: Floats, hz: Floats, solver: str
 ) -> tuple[Floats, float]:
     """Return strains of energy-orthonormal states of stress, and the truncated share."""
     resonant = 2 * np.pi * 200.0  # rad/s: modes below are weighted equally
@@ -203,7 +190,7 @@ def _states_of_stress(
     i, j = i[strongest], j[strongest]
     weight = reach[i] * reach[j] * np.where(i == j, 1, 2)
     incompatible = []
-    plane = _Plane.of(part, fixed, solver)
+    plane = _Plane.of(part, free, solver)
     for first, second, scale in zip(i, j, weight, strict=True):
         e = slopes[..., :, None, first] * slopes[..., None, :, second] * scale / 2
         incompatible.append(plane.incompatible((e + e.swapaxes(2, 3)) / 2))
@@ -226,19 +213,21 @@ class _Plane:
     solve: Callable[[Floats], Floats]
 
     @staticmethod
-    def of(part: Part, fixed: Bools, solver: str) -> _Plane:
+    def of(part: Part, free: Ints, solver: str) -> _Plane:
         n = part.D.shape[1]
-        horizontal = np.zeros((n, 3), bool)
-        horizontal[np.unique(part.nodes), :2] = True
-        moving = np.flatnonzero(horizontal.ravel() & ~fixed)
+        moving = np.intersect1d(dofs_of(np.unique(part.nodes))[:, :2], free)
         K = restrict(tangent(part, np.zeros((n, 3))), moving)
         return _Plane(part=part, moving=moving, solve=factorise(K, backend=solver).solve)
+
+    def strain_under(self, force: Floats) -> Floats:
+        """Return the in-plane strain (e, q, k, l) under nodal forces (3 n,) in N."""
+        v = np.zeros(force.size)
+        v[self.moving] = self.solve(force[self.moving])
+        slope = (self.part.D @ v.reshape(-1, 3)[:, :2]).reshape(*self.part.G.shape[:3], 2)
+        return (slope + slope.swapaxes(2, 3)) / 2
 
     def incompatible(self, e: Floats) -> Floats:
         """Return a strain (e, q, k, l) minus that of the in-plane displacement that relieves it."""
         f = np.zeros((self.part.D.shape[1], 3))
         f[:, :2] = spread_stress(self.part, stress(self.part, e))
-        v = np.zeros(f.size)
-        v[self.moving] = self.solve(f.ravel()[self.moving])
-        slope = (self.part.D @ v.reshape(-1, 3)[:, :2]).reshape(e.shape)
-        return e - (slope + slope.swapaxes(2, 3)) / 2
+        return e - self.strain_under(f.ravel())

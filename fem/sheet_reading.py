@@ -92,24 +92,23 @@ def quadratic_strain_at(reading: SheetReading, u: Floats) -> Floats:
     """Return the quadratic part u_i,a u_i,b / 2 (p, 3) of the strains xx, yy and xy of the middle
     plane at a displacement u (3 n,) in m.
     """
-    D = reading.part.D
-    slopes = (D @ u.reshape(-1, 3)).reshape(-1, 2, 3)
+    slopes = (reading.part.D @ u.reshape(-1, 3)).reshape(-1, 2, 3)
     return reading.fit @ np.stack(
         [(slopes[:, a] * slopes[:, b]).sum(axis=1) / 2 for a, b in PAIRS], axis=1
     )
 
 
-def modal_slopes(reading: SheetReading, basis: Floats) -> Floats:
-    """Return slopes (e q, 2, m) of the normal displacement at the quadrature points."""
+def modal_slopes(part: Part, basis: Floats) -> Floats:
+    """Return slopes (e, q, 2, m) of the normal displacement at the quadrature points."""
     w = basis.reshape(-1, 3, basis.shape[1])[:, 2]
-    return np.asarray((reading.part.D @ w).reshape(-1, 2, basis.shape[1]))
+    return np.asarray((part.D @ w).reshape(*part.G.shape[:3], -1))
 
 
 def modal_quadratic_strain(reading: SheetReading, basis: Floats) -> Floats:
     """Return Q (p, 3, m, m) with w,a w,b / 2 = z^T Q z / 2 at the points, for xx, yy and xy and a
     normal displacement w in coordinates z of a basis (3 n, m).
     """
-    slopes = modal_slopes(reading, basis)
+    slopes = modal_slopes(reading.part, basis).reshape(-1, 2, basis.shape[1])
     matrices = np.empty((reading.fit.shape[0], 3, *(slopes.shape[2:] * 2)))
     for p in range(len(matrices)):
         row = reading.fit[[p]].tocoo()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
@@ -11,8 +12,6 @@ from fem.assembly import Operators
 from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged
 from fem.typing import Floats
-
-MOST_RESTARTS = 40  # of the Lanczos method
 
 
 def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floats:
@@ -52,7 +51,9 @@ def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floa
     return operators.expand(u + factor.solve(f - operators.K @ u))
 
 
-def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats, Floats]:
+def modes(
+    operators: Operators, n: int, *, solver: str = "auto", most_restarts: int = 40
+) -> tuple[Floats, Floats]:
     """Return the undamped natural modes of lowest frequency.
 
     Rigid-body modes of a free body have frequencies near 0 Hz.
@@ -62,6 +63,7 @@ def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats
     operators : Operators
     n : number of modes
     solver : backend of `factorise`
+    most_restarts : of the Lanczos method
 
     Returns
     -------
@@ -88,7 +90,7 @@ def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats
         start = np.random.default_rng(0).standard_normal(K.shape[0])  # the same in each run
         try:
             squares, shapes = eigsh(
-                K, n, M=M, sigma=-shift, OPinv=inverse, maxiter=MOST_RESTARTS, v0=start
+                K, n, M=M, sigma=-shift, OPinv=inverse, maxiter=most_restarts, v0=start
             )
         except ArpackNoConvergence:
             continue
@@ -96,7 +98,7 @@ def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats
         frequencies = np.sqrt(np.maximum(squares[order], 0)) / (2 * np.pi)
         return frequencies, operators.expand(shapes[:, order])
     raise Diverged(
-        f"the {n} lowest modes did not converge in {MOST_RESTARTS} restarts because of round-off "
+        f"the {n} lowest modes did not converge in {most_restarts} restarts because of round-off "
         "in a thin body; constrain it, compute more modes, or mesh a thicker equivalent"
     )
 
@@ -108,17 +110,12 @@ def _inverses(operators: Operators, solver: str) -> Iterator[tuple[float, Factor
     K, M = operators.K, operators.M
     scale = K.trace() / M.trace()
     rigid = 1e-14  # of that square: below it a mode is a rigid-body mode
-    try:
+    with suppress(ValueError):
         factor = factorise(K, backend=solver)
-    except ValueError:
-        is_constrained = False
-    else:
         # Inverse iteration approaches a rigid-body mode if there is one; its energy is round-off.
         u = factor.solve(M @ np.random.default_rng(0).standard_normal(len(operators.free)))
-        is_constrained = bool(u @ (K @ u) > rigid * scale * (u @ (M @ u)))
-    if is_constrained:
-        yield 0.0, factor
-        return
-    free_shifts = (1e-6, 1e-9, 1e-12)  # of the square of the highest frequency, for free bodies
-    for part in free_shifts:
+        if u @ (K @ u) > rigid * scale * (u @ (M @ u)):
+            yield 0.0, factor
+            return
+    for part in (1e-6, 1e-9, 1e-12):
         yield part * scale, factorise(K + part * scale * M, backend=solver)

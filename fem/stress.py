@@ -28,7 +28,7 @@ from fem.assembly import by_region, direct_part, elements_of
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
 from fem.load_and_probe import locate, straight_coordinates
-from fem.maxwell import NO_INTERNAL_VARIABLES
+from fem.maxwell import refuse_own_law
 from fem.pressure_projection import dilatation_operator
 from fem.sparsity import dofs_of, from_entries
 from fem.typing import Floats, Ints
@@ -113,8 +113,7 @@ def relaxed_stress(stress: Floats, dt: float, material: Material) -> Floats:
     from scipy.interpolate import CubicSpline  # slow to import
     from scipy.signal import lfilter
 
-    if material.law is not None:
-        raise ValueError(NO_INTERNAL_VARIABLES)
+    refuse_own_law(material.law is not None)
     mu, material = material.shear_modulus, material.without_loss_factor()
     lag = material.viscosity / mu
     total = material.shear_modulus / mu * stress
@@ -132,8 +131,7 @@ def materials_at(
     mesh: TetMesh, material: Material | Mapping[int, Material], points: ArrayLike
 ) -> tuple[Material, ...]:
     """Return the material at each point (p, 3), with Prony terms instead of loss factors."""
-    given, region = by_region(mesh, material)
-    materials = [m.without_loss_factor() for m in given]
+    materials, region = _materials(mesh, material)
     return tuple(materials[r] for r in region[locate(mesh, points)[0]])
 
 
@@ -220,7 +218,8 @@ def _strain_rows(mesh: TetMesh, used: Ints) -> sparse.csr_array:
 def _projected_share(material: Material) -> float:
     """Return the share of lam that acts on the projected dilatation."""
     lam, mu = np.array(material.first_lame), np.array(material.shear_modulus)
-    return float(1 - direct_part(lam, mu) / lam) if direct_part(lam, mu) < lam else 0.0
+    direct = direct_part(lam, mu)
+    return float(1 - direct / lam) if direct < lam else 0.0
 
 
 def _sampled_strain(mesh: TetMesh, used: Ints, material: Material) -> sparse.csr_array:

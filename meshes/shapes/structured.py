@@ -17,14 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshes.facets import tag_boundary
-from meshes.tetmesh import (
-    MeshError,
-    TetMesh,
-    boundary_facets,
-    corner_volumes,
-    facet_set,
-    quadratic,
-)
+from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes, facet_set, quadratic
 from meshes.typing import Floats, Ints
 
 Lines = tuple[Floats, Floats, Floats]  # m, increasing, along x, y and z
@@ -91,11 +84,7 @@ def sheet(
 
 
 def block(
-    lengths: tuple[float, float, float],
-    h: float,
-    *,
-    grading: Grading | None = None,
-    order: int = 2,
+    lengths: tuple[float, float, float], h: float, *, grading: Grading | None = None, order: int = 2
 ) -> TetMesh:
     """Return a rectangular block with its base as `clamped` and its sides as `absorbing` facets.
 

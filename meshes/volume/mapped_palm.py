@@ -120,10 +120,7 @@ def _round_corners(
     angle = np.maximum(way - straight, 0) / np.maximum(r, 1e-300)
     out = level * np.where(on_x, a, b) - r * (1 - np.cos(angle))
     along = np.where(way <= straight, way, straight + r * np.sin(angle))
-    return (
-        np.copysign(np.where(on_x, out, along), x),
-        np.copysign(np.where(on_x, along, out), y),
-    )
+    return (np.copysign(np.where(on_x, out, along), x), np.copysign(np.where(on_x, along, out), y))
 
 
 def _onto_level_set(palm: Palm, grid: Floats) -> Floats:

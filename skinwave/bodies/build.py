@@ -51,10 +51,7 @@ class Build:
 
 
 def build(
-    body: Body,
-    h: float | None = None,
-    symmetry: str = "",
-    discretise: Discretise | None = None,
+    body: Body, h: float | None = None, symmetry: str = "", discretise: Discretise | None = None
 ) -> Build:
     """Mesh a body with its materials and boundary conditions.
 

@@ -7,13 +7,7 @@ import numpy as np
 
 import fem
 from fem.load_and_probe import facet_points
-from meshes import (
-    Grading,
-    TetMesh,
-    boundary_facets,
-    graded_axis,
-    mapped_palm,
-)
+from meshes import Grading, TetMesh, boundary_facets, graded_axis, mapped_palm
 from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
 from meshes.shapes.structured import Lines, check_size, mirror_line

@@ -8,13 +8,7 @@ from meshes import Grading, extrude, graded_axis
 from meshes.files.import_body import FINE_RADIUS
 from meshes.shapes.structured import Lines, check_size, mirror_line, with_planes
 from simple_model.layers.compliance import layered
-from skinwave.bodies.absorbing_layer import (
-    far_springs,
-    has_layer,
-    layer_drag,
-    layer_line,
-    layer_of,
-)
+from skinwave.bodies.absorbing_layer import far_springs, has_layer, layer_drag, layer_line, layer_of
 from skinwave.bodies.analytic import stack, stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretise, Discretised, in_layers

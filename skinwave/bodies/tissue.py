@@ -25,10 +25,7 @@ def hand_size(body: Body) -> float:
 
 
 def in_tissue_layers(
-    body: Body,
-    h: float,
-    mesh: TetMesh,
-    rest: Callable[[TetMesh], fem.Support] | None = None,
+    body: Body, h: float, mesh: TetMesh, rest: Callable[[TetMesh], fem.Support] | None = None
 ) -> Discretised:
     """Return the body of a mesh with elements of h in m, with its layers, regions, coat and
     support.
@@ -86,7 +83,7 @@ def supported_share(cosine: Floats) -> Floats:
 
 def _shear_stiffness(body: Body, mesh: TetMesh) -> float:
     """Unrelaxed (fast) shear modulus over the mean thickness, N/m3."""
-    _, normals = facet_geometry(mesh, boundary_facets(mesh.tets))
+    _, normals = facet_geometry(mesh.points[boundary_facets(mesh.tets)])
     thickness = corner_volumes(mesh.points, mesh.tets).sum() / np.maximum(normals[..., 2], 0).sum()
     return float((body.softest.shear_modulus + body.softest.fast_modulus) / thickness)
 

@@ -102,7 +102,7 @@ def expansion_point(
     slowness = {region: 1 / solid.shear_speed for region, solid in build.material.items()}
     volumes = corner_volumes(mesh.points, mesh.tets[:, :4])
     crossing = sum(volumes[mesh.region == k].sum() * each for k, each in slowness.items())
-    area = np.abs(facet_geometry(mesh, mesh.facets["top"])[1][..., 2]).sum()
+    area = np.abs(facet_geometry(mesh.points[mesh.facets["top"]])[1][..., 2]).sum()
     return float(np.clip(per_crossing * area / crossing, *within))
 
 

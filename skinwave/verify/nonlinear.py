@@ -34,7 +34,7 @@ def elastica() -> Checks:
     material = fem.from_young(density=1, young=1e9, poisson=0.0)
     mesh = meshes.extrude(np.linspace(0, 1, 21), [0, width], [-thickness, 0])
     body = fem.finite_strain(mesh, material, fixed={"left": "xyz"})
-    N, normals = facet_geometry(mesh, mesh.facets["right"])
+    N, normals = facet_geometry(mesh.points[mesh.facets["right"]])
     share = np.zeros(len(mesh.points))
     np.add.at(share, mesh.facets["right"], np.einsum("qa,eqi->ea", N, normals))
     share /= share.sum()

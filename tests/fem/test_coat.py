@@ -150,7 +150,9 @@ def test_mass_of_a_coat_is_the_difference_of_densities():
     mesh = block((40.0, 40.0))
     up = np.tile([0.0, 0.0, 1.0], len(mesh.points))
     M = added(mesh)[2]
-    area = np.linalg.norm(fem.load_and_probe.facet_geometry(mesh, mesh.facets["top"])[1], axis=2)
+    area = np.linalg.norm(
+        fem.load_and_probe.facet_geometry(mesh.points[mesh.facets["top"]])[1], axis=2
+    )
     inner = area.sum() * ((1 - 40 * 0.4e-3 / 2) ** 2 + (40 * 0.4e-3) ** 2 / 12)
     assert up @ (M @ up) == pytest.approx(100 * 0.4e-3 * inner, rel=2e-3)
 

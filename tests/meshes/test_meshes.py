@@ -215,7 +215,7 @@ def grid(palm, cell):
 def measures(mesh):
     """Volume and area within curved boundary facets; the volume is exact for ten-node elements."""
     facets = meshes.boundary_facets(mesh.tets)
-    _, normals = fem.load_and_probe.facet_geometry(mesh, facets)
+    _, normals = fem.load_and_probe.facet_geometry(mesh.points[facets])
     at = fem.facet_points(mesh, facets).reshape(normals.shape)
     return np.einsum("eqi,eqi->", at, normals) / 3, np.linalg.norm(normals, axis=2).sum()
 

@@ -1,11 +1,12 @@
 """Sheets from rest by their modes, linear and stretched, and plans that choose them."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-import fem.krylov
+import fem
 from simple_model import MovingPressure, Stack, Tacton, Trajectory, flat_body, from_young
 from simple_model.layers.compliance import layered
 from skinwave import plan
@@ -223,7 +224,7 @@ def test_the_cure_of_a_stretching_warning_can_be_computed(mounting):
 
 
 def test_a_reduction_out_of_reach_names_the_model_that_works(monkeypatch):
-    monkeypatch.setattr(fem.krylov, "MOST_MOMENTS", 6)
+    monkeypatch.setattr(fem, "reduce", partial(fem.reduce, most_moments=6))
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05))
     scene = Scene(pressure=pressure, body=STRETCHED, probes=((0.01, 0.005),))
     with pytest.raises(ValueError, match="6 moments.*use --model"):
