@@ -48,9 +48,9 @@ from fem.reduced import Poles, ReducedModel, poles, transfer
 from fem.static import modes, static
 from fem.stress import relaxation, strain_operator
 from fem.transient import Diverged, State, at_rest, transient
-from fem.typing import Complex
 from simple_model import Material, PronyTerm, from_young, of_law, tabulated
 from simple_model.layers.material import PRESETS
+from simple_model.typing import Complex
 
 __all__ = [
     "PRESETS", "Coat", "Complex", "Diverged", "Elastic", "EnergyBalance", "Factor", "LineSolver",

@@ -33,9 +33,9 @@ from fem.coat import Coat
 from fem.linear_solver import SumFactoriser
 from fem.maxwell import MaxwellBranch, property_of, relaxation_of
 from fem.transient import Diverged
-from fem.typing import Complex, Floats, Ints
 from meshes import TetMesh
 from simple_model.layers.material import Material
+from simple_model.typing import Complex, Floats, Ints
 
 Terms = tuple[tuple[str, int], ...]
 
@@ -61,16 +61,6 @@ class AffineOperators:
     parts: Any
     free: Ints
     n_dofs: int
-
-    def of(self, *kinds: str) -> list[Any]:
-        """Return the matrices of some kinds."""
-        each = zip(self.terms, self.parts, strict=True)
-        return [part for (kind, _), part in each if kind in kinds]
-
-    @property
-    def fluid(self) -> Any:
-        """Added mass of a fluid in kg, or None."""
-        return next(iter(self.of("fluid")), None)
 
     @property
     def air(self) -> Air | None:
@@ -233,7 +223,7 @@ def line_solution(
     force = force.astype(np.complex128)
     if not len(around):
         return factor.solve(force)
-    E = fluid_share * sum(w * M for w, M in zip(own[is_mass], dry.of("mass"), strict=True))
+    E = fluid_share * sum(w * dry.parts[q] for q, w in enumerate(own) if is_mass[q])
     solve, air = factor.solve, list(zip(around, affine.parts[len(is_mass) :], strict=True))
 
     def preconditioned(u: Complex) -> Complex:

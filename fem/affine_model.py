@@ -13,7 +13,7 @@ import numpy as np
 
 from fem.affine import AffineOperators, Solids, Terms, operators_of
 from fem.assembly import Operators
-from fem.typing import Array, Complex, Floats
+from simple_model.typing import Array, Complex, Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -26,11 +26,11 @@ from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
 from fem.plane_stiffness import SIDES
 from fem.sparsity import dofs_of, from_entries
-from fem.typing import Floats, Ints
 from meshes import MeshError, TetMesh, facet_set
 from simple_model.layers.compliance import AIR_VISCOSITY
 from simple_model.load.focus import SPEED_OF_SOUND as C
 from simple_model.plates.air import edge_functions, open_air
+from simple_model.typing import Floats, Ints
 
 RESISTANCES = {"friction": 0.5, "monopole": 2.0, "dipole": 4.0}  # powers of angular frequency
 

@@ -30,7 +30,6 @@ from scipy import sparse
 from fem.boundary import Support, dashpots, fixed_dofs, springs
 from fem.coat import Coat, coat_operators
 from fem.combination import Combination, Laws, viscoelastic
-from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradient_integrals, jacobians, shape_nodes
 from fem.maxwell import Branch, add_matrices, property_of
 from fem.memory import check_memory
@@ -43,9 +42,10 @@ from fem.plane_stiffness import (
 )
 from fem.pressure_projection import projected_divergence
 from fem.sparsity import UPPER, SparsityPattern, in_each_direction, restrict, select, slabs
-from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
+from meshes.elements import shape_functions, tetrahedron_rule
 from simple_model.layers.material import Material
+from simple_model.typing import Bools, Floats, Ints
 
 Materials = Material | Mapping[int, Material]
 Fixed = str | Mapping[str, str] | ArrayLike
@@ -107,11 +107,8 @@ class MovingNodes:
         nodes = np.unique(free // 3)
         number = np.full(len(mesh.points), len(nodes))
         number[nodes] = np.arange(len(nodes))
-        return MovingNodes(
-            nodes=nodes,
-            pattern=SparsityPattern.of(number[mesh.tets], len(nodes)),
-            free=3 * number[free // 3] + free % 3,
-        )
+        pattern = SparsityPattern.of(number[mesh.tets], len(nodes))
+        return MovingNodes(nodes=nodes, pattern=pattern, free=3 * number[free // 3] + free % 3)
 
     def on_free(self, A: Any) -> sparse.csr_array:
         """Restrict a matrix on these nodes to the free degrees of freedom."""
@@ -139,7 +136,6 @@ def assemble(
 
     Parameters
     ----------
-    mesh : TetMesh
     material : Material, or mapping of region numbers to Materials
     fixed : name of a facet set that does not move; or mapping of facet sets to fixed components,
         such as {"bottom": "xyz", "left": "x"}; or (n, 3) bool, True where fixed
@@ -152,11 +148,6 @@ def assemble(
         coordinate axes by default
     stiffener : (3 n, 3 n) N/m, further elastic stiffness, such as a `shell_stiffness`, that scales
         with the modulus of the first material; or None
-
-    Returns
-    -------
-    Operators
-        Operators on the free degrees of freedom.
 
     Raises
     ------
@@ -207,15 +198,9 @@ def assemble(
         relaxing = tuple(replace(b, K=restrict(b.K, free)) for b in of_coat[3])
         K, C, M, branches = add_matrices((K, C, M, branches), (*thin, relaxing))
     return Operators(
-        K=K,
-        C=C,
-        M=M,
-        R=R,
-        free=free,
-        n_dofs=mesh.n_dofs,
-        branches=branches,
+        K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches,
         laws=combined if coat is None else None,
-    )
+    )  # fmt: skip
 
 
 def _volume(
@@ -270,12 +255,12 @@ def element_stiffness(mesh: TetMesh, mu: Floats, lam: Floats) -> Iterator[tuple[
     `UPPER`, for Lame's parameters mu and lam (e,) in Pa.
     """
 
-    def elastic(slab: slice, G: Floats) -> Floats:
+    def coefficients(slab: slice, G: Floats) -> Floats:
         l2, m2 = lam[slab, None], mu[slab, None]
         shear = m2 * (G[0, 0] + G[1, 1] + G[2, 2])
         return np.array([l2 * G[i, j] + m2 * G[j, i] + (i == j) * shear for i, j in UPPER])
 
-    return gradient_integrals(mesh, elastic)
+    return gradient_integrals(mesh, coefficients)
 
 
 def element_masses(mesh: TetMesh, rho: Floats) -> Iterator[tuple[slice, Floats]]:

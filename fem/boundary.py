@@ -11,10 +11,10 @@ from scipy import sparse
 
 from fem.load_and_probe import facet_geometry, facet_normals
 from fem.sparsity import dofs_of, from_entries
-from fem.typing import Bools, Floats, Ints
 from meshes import MeshError, TetMesh, facet_set
 from meshes.tetmesh import FACES, facet_keys
 from simple_model.layers.material import Material
+from simple_model.typing import Bools, Floats, Ints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -32,13 +32,13 @@ from scipy import sparse
 
 from fem.boundary import owners
 from fem.combination import viscoelastic
-from fem.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions, triangle_rule
 from fem.load_and_probe import facet_geometry
 from fem.maxwell import Matrices, property_of
 from fem.sparsity import dofs_of, from_entries
-from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
+from meshes.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions, triangle_rule
 from simple_model.layers.material import Material
+from simple_model.typing import Bools, Floats, Ints
 
 STATIONS, STATION_WEIGHTS = np.polynomial.legendre.leggauss(2)  # through each layer, along edges
 
@@ -85,11 +85,11 @@ class Coat:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Surface:
-    """Surface of a coat: `nodes` (n,) of the mesh; `facets` (e, a), which number these nodes; their
-    `points` and unit `normals` (e, a, i); the operator T, `turn` (e, 3 a, 3 a); and the `edges`.
+    """Surface of a coat: nodes of its `facets` (e, a) among the n nodes of a mesh with `n_dofs`,
+    their `points` and unit `normals` (e, a, i), T as `turn` (e, 3 a, 3 a), and the `edges`.
     """
 
-    nodes: Ints
+    n_dofs: int
     facets: Ints
     points: Floats
     normals: Floats
@@ -118,19 +118,18 @@ def surface_of(mesh: TetMesh, coat: Coat, fixed: Bools) -> Surface:
     """Return the surface of a coat on ten-node tetrahedra. Its normals do not turn at a border
     where `fixed` (3 n,) holds the direction across it.
     """
-    of_mesh = facet_set(mesh, coat.facets)
-    if (a := of_mesh.shape[1]) != 6:
+    facets = facet_set(mesh, coat.facets)
+    if (a := facets.shape[1]) != 6:
         raise ValueError(f"facets of a coat have {a} nodes and need 6; make the mesh with order=2")
-    nodes, facets = np.unique(of_mesh, return_inverse=True)
-    facets, points = facets.reshape(of_mesh.shape), mesh.points[of_mesh]
+    points = mesh.points[facets]
     at_nodes = np.vstack([np.eye(3), np.eye(3)[TRIANGLE_EDGES].mean(axis=1)])
     slopes = np.broadcast_to(shape_derivatives(at_nodes, a), (len(facets), a, a, 2))
     tangents, normals = _frames(points, slopes)
     turn = -np.einsum("eaid,eabd,eaj->eaibj", np.linalg.pinv(tangents), slopes, normals)
     return Surface(
-        nodes=nodes, facets=facets, points=points, normals=normals,
+        n_dofs=mesh.n_dofs, facets=facets, points=points, normals=normals,
         turn=turn.reshape(-1, 3 * a, 3 * a),
-        edges=_edges(facets, points, fixed.reshape(-1, 3)[of_mesh]),
+        edges=_edges(facets, points, fixed.reshape(-1, 3)[facets]),
     )  # fmt: skip
 
 
@@ -186,7 +185,7 @@ def coat_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> spa
         K = weight * membrane_stiffness(points, mu[layer], lam[layer])
         KT = z * K @ T
         local += K + KT + KT.swapaxes(1, 2) + z * T.swapaxes(1, 2) @ KT
-    within = _sum_elements(local, surface.facets, len(surface.nodes))
+    within = _sum_elements(local, surface)
     return (within + _edge_stiffness(surface, coat, mu, lam)).tocsr()
 
 
@@ -212,7 +211,7 @@ def _edge_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> sp
     def of_both(values: Floats) -> sparse.csr_array:
         """Return the sum (edges q, 3 n) of values (h, q, 3 a) over both sides."""
         whole = edges.sides[:, None, None] * values
-        return from_entries(whole, rows, dofs, (lengths.size, 3 * len(surface.nodes)))
+        return from_entries(whole, rows, dofs, (lengths.size, surface.n_dofs))
 
     jump, mean = of_both(edges.outwards), of_both(moment / 2)
     work = jump.T @ mean.multiply(lengths.reshape(-1, 1))
@@ -268,14 +267,13 @@ def coat_mass(surface: Surface, coat: Coat, density: Floats) -> sparse.csr_array
     """Return the mass (3 n, 3 n) in kg of a coat, int rho N_a N_b dA dz, for densities (layers, e)
     minus those of the replaced material.
     """
-    facets = surface.facets
-    N = shape_functions(triangle_rule()[0], facets.shape[1])
-    local = np.zeros((*facets.shape, facets.shape[1]))
+    k, a = surface.facets.shape
+    N, local = shape_functions(triangle_rule()[0], a), np.zeros((k, a, a))
     for z, weight, layer in zip(*coat.stations, strict=True):
         normals = facet_geometry(surface.points + z * surface.normals)[1]
         area = weight * density[layer][:, None] * np.linalg.norm(normals, axis=2)
         local += np.einsum("eq,qa,qb->eab", area, N, N, optimize=True)
-    return _sum_elements(np.einsum("eab,ij->eaibj", local, np.eye(3)), facets, len(surface.nodes))
+    return _sum_elements(np.einsum("eab,ij->eaibj", local, np.eye(3)), surface)
 
 
 def coat_operators(
@@ -296,25 +294,17 @@ def coat_operators(
         return values[:layers, None] - values[layers:][behind]
 
     def stiffness(share: Floats) -> sparse.csr_array:
-        K = coat_stiffness(surface, coat, excess(share * mu), excess(share * lam))
-        return _on_mesh(surface, K, mesh.n_dofs)
+        return coat_stiffness(surface, coat, excess(share * mu), excess(share * lam))
 
     def mass(density: Floats) -> sparse.csr_array:
-        return _on_mesh(surface, coat_mass(surface, coat, excess(density)), mesh.n_dofs)
+        return coat_mass(surface, coat, excess(density))
 
     K, C, M, branches, _ = viscoelastic(both, stiffness, mass)
     return K, C, M, branches
 
 
-def _on_mesh(surface: Surface, operator: sparse.csr_array, n_dofs: int) -> sparse.csr_array:
-    """Return an operator (3 n, 3 n) of a surface on the dofs of the whole mesh."""
-    dofs = dofs_of(surface.nodes).ravel()
-    part = operator.tocoo()
-    return from_entries(part.data, dofs[part.row], dofs[part.col], (n_dofs, n_dofs))
-
-
-def _sum_elements(local: Floats, facets: Ints, n: int) -> sparse.csr_array:
-    """Return the sum (3 n, 3 n) of matrices (e, a, i, b, j) of facets (e, a) among n nodes."""
-    dofs = dofs_of(facets).reshape(len(facets), -1)
+def _sum_elements(local: Floats, surface: Surface) -> sparse.csr_array:
+    """Return the sum (3 n, 3 n) of matrices (e, a, i, b, j) of the facets of a surface."""
+    dofs = dofs_of(surface.facets).reshape(len(surface.facets), -1)
     local = local.reshape(*dofs.shape, dofs.shape[1])
-    return from_entries(local, dofs[:, :, None], dofs[:, None], (3 * n, 3 * n))
+    return from_entries(local, dofs[:, :, None], dofs[:, None], 2 * (surface.n_dofs,))

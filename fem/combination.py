@@ -13,8 +13,8 @@ import numpy as np
 from scipy import sparse
 
 from fem.maxwell import Branch, DispersiveBranch, MaxwellBranch, property_of, relaxation_of
-from fem.typing import Floats
 from simple_model.layers.material import Material
+from simple_model.typing import Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,7 +20,7 @@ from scipy import sparse
 from fem.assembly import Operators
 from fem.maxwell import Branch, MaxwellBranch, maxwell_only
 from fem.transient import State
-from fem.typing import Complex, Floats
+from simple_model.typing import Complex, Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

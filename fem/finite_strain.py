@@ -20,15 +20,15 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fem.assembly import assemble, by_region
-from fem.elements import shape_derivatives, triangle_rule
 from fem.energy import Elastic, Relaxing
 from fem.geometry import gradients, shape_nodes
-from fem.maxwell import MaxwellBranch, relaxation_of
+from fem.maxwell import MaxwellBranch, property_of, relaxation_of
 from fem.plane_stiffness import SIDES, Tension, directional_parts, tension_stiffness
 from fem.sparsity import UPPER, SparsityPattern, from_entries, restrict, slabs
-from fem.typing import Floats, Ints
 from meshes import MeshError, TetMesh
+from meshes.elements import shape_derivatives, triangle_rule
 from simple_model.layers.material import Material
+from simple_model.typing import Floats, Ints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,13 +65,21 @@ class Part:
     orthotropic: Floats | None = None
 
     @staticmethod
-    def of(nodes: Ints, G: Floats, volume: Floats, lam: Floats, mu: Floats, n: int) -> Part:
-        """Return the part of a mesh of n nodes."""
+    def of(
+        nodes: Ints, G: Floats, volume: Floats, n: int, materials: list[Material], region: Ints,
+        lam: Floats,
+    ) -> Part:  # fmt: skip
+        """Return the part of a mesh of n nodes. `region` (e,) has the index of each element's
+        material, and `lam` (r,) Lame's first parameter of each material in Pa.
+        """
         rows = np.arange(G[..., 0].size).reshape(*G.shape[:-1], 1)
         D = from_entries(G, rows, nodes[:, None, None], (G[..., 0].size, n))
+        mu, added = property_of(materials, "shear_modulus"), directional_parts(materials)
+        each = np.array([added.get(m, np.zeros((3, 3))) for m in range(len(materials))])
         return Part(
-            nodes=nodes, G=G, volume=volume, lam=lam, mu=mu, D=D,
+            nodes=nodes, G=G, volume=volume, lam=lam[region], mu=mu[region], D=D,
             D_transposed=D.T.tocsr(), pattern=SparsityPattern.of(nodes, n),
+            orthotropic=each[region] if added else None,
         )  # fmt: skip
 
 
@@ -178,19 +186,9 @@ def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Pa
                 f"poisson is {m.poisson}, but elements at large displacement lock above {largest}; "
                 "use the linear model fem"
             )
-    lam, mu = np.array([(m.first_lame, m.shear_modulus) for m in materials])[region].T
+    lam = property_of(materials, "first_lame")
     G, volume = gradients(shape_nodes(mesh), mesh.tets.shape[1], 2, 0)
-    part = Part.of(mesh.tets, G, volume, lam, mu, len(mesh.points))
-    return _with_orthotropy(part, materials, region)
-
-
-def _with_orthotropy(part: Part, materials: list[Material], region: Ints) -> Part:
-    """Add the orthotropy of materials with index (e,) to a part."""
-    added = directional_parts(materials)
-    if not added:
-        return part
-    each = np.array([added.get(m, np.zeros((3, 3))) for m in range(len(materials))])
-    return replace(part, orthotropic=each[region])
+    return Part.of(mesh.tets, G, volume, len(mesh.points), materials, region, lam)
 
 
 def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
@@ -211,9 +209,8 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
     G = np.einsum("ekd,qad->eqka", np.linalg.inv(edges), derivatives)
     volume = membrane.thickness * area[:, None] * weights
     lam = 2 * m.first_lame * m.shear_modulus / (m.first_lame + 2 * m.shear_modulus)
-    alike = np.ones(len(nodes))
-    part = Part.of(nodes, G, volume, lam * alike, m.shear_modulus * alike, len(mesh.points))
-    return _with_orthotropy(part, [m], np.zeros(len(nodes), np.int64))
+    region = np.zeros(len(nodes), np.int64)
+    return Part.of(nodes, G, volume, len(mesh.points), [m], region, np.array([lam]))
 
 
 def internal_force(part: Part, u: Floats) -> Floats:

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from fem.elements import shape_derivatives, tetrahedron_rule
 from fem.sparsity import slabs
-from fem.typing import Floats
 from meshes import MeshError, TetMesh
+from meshes.elements import shape_derivatives, tetrahedron_rule
 from meshes.tetmesh import EDGES
+from simple_model.typing import Floats
 
 
 def shape_nodes(mesh: TetMesh) -> Floats:

@@ -31,7 +31,7 @@ from fem.affine_model import (
     steady_states,
 )
 from fem.krylov import reduce
-from fem.typing import Array, Complex, Floats, Ints
+from simple_model.typing import Array, Complex, Floats, Ints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,7 +88,8 @@ def reduce_affine(
     """
     t = min(range(len(training)), key=lambda each: _loss(training[each].solids))
     first = training[t].geometry()
-    M = _mass(first.affine, training[t].solids)
+    M, air = operators_of(first.affine.in_vacuum(), training[t].solids).M, first.affine.air
+    M = aslinearoperator(M) + air.mass if air else M
     basis, visited, checked = np.zeros((len(first.affine.free), 0)), set[int](), 0
     parts = np.zeros((len(geometries), len(first.affine.parts), 0, 0))
     errors: dict[int, float] = {}
@@ -186,25 +187,14 @@ def _outputs(
     model: AffineModel, variant: Variant, frequencies: Floats, line: int, solver: str
 ) -> Complex:
     """Return the steady outputs (p,) of the full body at one line."""
-    full, share = variant.geometry(), 0.0
+    full, small, share = variant.geometry(), interpolate(model, variant.shares), 0.0
     at = weights(model.terms, variant.solids, frequencies[[line]])
-    if full.affine.fluid is not None:
-        share = _fluid_share(model, variant, steady_states(model, at, variant.shares, [line])[0])
+    if small.air is not None:
+        x = steady_states(model, at, variant.shares, [line])[0]
+        own = operators_of(small.in_vacuum(), variant.solids).M
+        share = float(np.vdot(x, small.air.mass @ x).real / np.vdot(x, own @ x).real)
     u = line_solution(full.affine, at[0], full.forces[line], solver=solver, fluid_share=share)
     return np.asarray(full.outputs @ u)
-
-
-def _fluid_share(model: AffineModel, variant: Variant, x: Complex) -> float:
-    """Return the added mass of a fluid over the body's own mass in a state (m,) of the model."""
-    small = interpolate(model, variant.shares)
-    own = operators_of(small.in_vacuum(), variant.solids).M
-    return float(np.vdot(x, small.fluid @ x).real / np.vdot(x, own @ x).real)
-
-
-def _mass(affine: AffineOperators, solids: Solids) -> LinearOperator:
-    """Return the mass (n, n) of the full body, including that of a fluid."""
-    own = aslinearoperator(operators_of(affine.in_vacuum(), solids).M)
-    return own if affine.fluid is None else own + affine.fluid
 
 
 def _join(basis: Floats, more: Floats, M: LinearOperator) -> Floats:

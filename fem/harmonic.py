@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from fem.assembly import Operators
 from fem.linear_solver import SumFactoriser
 from fem.maxwell import Branch, relaxing_stiffness
-from fem.typing import Complex, Floats
+from simple_model.typing import Complex, Floats
 
 
 def dynamic_stiffness(K: Any, C: Any, M: Any, branches: Sequence[Branch], s: Any) -> Any:
@@ -25,13 +25,8 @@ def dynamic_stiffness(K: Any, C: Any, M: Any, branches: Sequence[Branch], s: Any
 
 
 class LineSolver:
-    """Steady state of a body, by one factorisation per frequency.
-
-    Parameters
-    ----------
-    operators : Operators
-    solver : backend of `factorise`
-    accuracy : largest residual over the force
+    """Steady state of a body, by one factorisation per frequency with a backend of `factorise`;
+    `accuracy` is the largest residual over the force.
     """
 
     def __init__(
@@ -64,7 +59,6 @@ def harmonic(
 
     Parameters
     ----------
-    operators : Operators
     force : (3 n,) or (3 n, k) float or complex, N, the same at each frequency
     frequencies : (f,) float, Hz
     solver : backend of `factorise`

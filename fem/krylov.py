@@ -36,7 +36,7 @@ from fem.harmonic import dynamic_stiffness
 from fem.linear_solver import Factor, factorise
 from fem.maxwell import MaxwellBranch, maxwell_only
 from fem.reduced import ReducedModel
-from fem.typing import Complex, Floats
+from simple_model.typing import Complex, Floats
 
 EXPANSION_POINT = 2 * np.pi * 200.0  # rad/s: about 4.5 times the lowest natural frequency is best
 

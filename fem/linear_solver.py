@@ -18,7 +18,7 @@ from scipy.sparse.linalg import splu
 
 from fem.pardiso import Pardiso, PardisoError, mkl
 from fem.sparsity import on_one_pattern, upper_triangle
-from fem.typing import Array, Ints
+from simple_model.typing import Array, Ints
 
 BACKENDS = ("pardiso", "superlu")
 
@@ -43,10 +43,6 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
     ----------
     A : sparse (n, n), float or complex
     backend : "auto" for the fastest installed one, or one of `BACKENDS`
-
-    Returns
-    -------
-    Factor
 
     Raises
     ------
@@ -125,13 +121,9 @@ class SumFactoriser:
     """
 
     def __init__(
-        self,
-        matrices: Sequence[sparse.csr_array],
-        *,
-        backend: str = "auto",
-        accuracy: float = 1e-10,
-        slowest: float = 0.2,
-    ) -> None:
+        self, matrices: Sequence[sparse.csr_array], *, backend: str = "auto",
+        accuracy: float = 1e-10, slowest: float = 0.2,
+    ) -> None:  # fmt: skip
         self._values, self._indices, self._indptr = on_one_pattern(matrices)
         self._backend, self._is_single = backend, True
         self._accuracy, self._slowest = accuracy, slowest

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from fem.elements import shape_derivatives, shape_functions, triangle_rule
 from fem.sparsity import dofs_of, from_entries
-from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
+from meshes.elements import shape_derivatives, shape_functions, triangle_rule
+from simple_model.typing import Bools, Floats, Ints
 
 
 def pressure_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
@@ -81,7 +81,6 @@ def probe_operator(
 
     Parameters
     ----------
-    mesh : TetMesh
     points : (p, 2) or (p, 3) float, m
     facets : name of a facet set, or nodes (e, a)
     patch : standard deviation in m of the Gaussian weights of normals around a point, or 0

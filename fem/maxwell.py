@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from fem.typing import Floats
 from simple_model.layers.material import Material
+from simple_model.typing import Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,7 +20,7 @@ import numpy as np
 from fem.energy import Elastic
 from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged, State, acceleration, at_rest, check_step
-from fem.typing import Floats
+from simple_model.typing import Floats
 
 
 class _Stuck(ArithmeticError):
@@ -41,7 +41,6 @@ def static(
 
     Parameters
     ----------
-    body : Elastic
     force : (3 n,) float, N
     start : (3 n,) float, m, initial guess; undeformed by default
     tolerance : largest residual relative to the force; or, for residuals below 1e-5, largest
@@ -163,7 +162,6 @@ def dynamic(
 
     Parameters
     ----------
-    body : Elastic
     initial : state with initial displacement and velocity; at rest by default
     tolerance : last Newton correction relative to the displacement of the step
     most_iterations : of Newton's method in a step

@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 
 from fem.memory import free_memory
-from fem.typing import Array, Index
+from fem.sparsity import Index
+from simple_model.typing import Array
 
 log = logging.getLogger(__name__)
 

@@ -19,9 +19,9 @@ from scipy import sparse
 
 from fem.geometry import gradient_integrals
 from fem.sparsity import UPPER, SparsityPattern
-from fem.typing import Floats
 from meshes import TetMesh
 from simple_model.layers.material import Material
+from simple_model.typing import Floats
 
 SIDES = np.eye(3)[:2]  # unit vectors (2, 3) along the sides x and y of a sheet that lies flat
 
@@ -55,10 +55,10 @@ def orthotropic_stiffness(
     by_strain = strains.reshape(3, 9)
     tensor = (by_strain.T @ added @ by_strain).reshape(3, 3, 3, 3)  # (i, k, j, l)
 
-    def contracted(_: slice, G: Floats) -> Floats:
+    def coefficients(_: slice, G: Floats) -> Floats:
         return np.array([np.tensordot(tensor[i, :, j], G, 2) for i, j in UPPER])
 
-    return pattern.blocks(gradient_integrals(mesh, contracted))
+    return pattern.blocks(gradient_integrals(mesh, coefficients))
 
 
 def tension_stiffness(
@@ -71,8 +71,8 @@ def tension_stiffness(
     stress = axes.T @ np.diag([tension.x, tension.y]) @ axes / np.ptp(mesh.points @ normal)
     outer = np.outer(normal, normal)
 
-    def contracted(_: slice, G: Floats) -> Floats:
+    def coefficients(_: slice, G: Floats) -> Floats:
         scalar = np.tensordot(stress, G, 2)
         return np.array([outer[i, j] * scalar for i, j in UPPER])
 
-    return pattern.blocks(gradient_integrals(mesh, contracted))
+    return pattern.blocks(gradient_integrals(mesh, coefficients))

@@ -12,12 +12,12 @@ positive definite.
 import numpy as np
 from scipy import sparse
 
-from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, jacobians, shape_nodes
 from fem.sparsity import from_entries
-from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh
+from meshes.elements import shape_functions, tetrahedron_rule
 from meshes.tetmesh import EDGES, FACES, neighbours
+from simple_model.typing import Bools, Floats, Ints
 
 
 def projected_divergence(mesh: TetMesh) -> sparse.bsr_array:

@@ -22,7 +22,7 @@ from scipy import linalg
 from fem.assembly import Operators
 from fem.harmonic import dynamic_stiffness
 from fem.maxwell import maxwell_only
-from fem.typing import Complex, Floats
+from simple_model.typing import Complex, Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,7 +52,6 @@ def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Com
 
     Parameters
     ----------
-    model : ReducedModel
     forces : (r, k) float, N kg^-1/2, reduced forces
     frequencies : (f,) float, Hz
 

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import LinearOperator
 
 from fem.air import Air, damping
 from fem.assembly import Operators
@@ -30,9 +29,9 @@ from fem.maxwell import maxwell_only
 from fem.sheet_reading import SheetReading, modal_slopes
 from fem.sparsity import dofs_of, restrict
 from fem.static import modes
-from fem.typing import Floats, Ints
 from meshes import TetMesh
 from simple_model.layers.material import Material
+from simple_model.typing import Floats, Ints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,8 +63,10 @@ def stretching_modes(
     """
     hz, shapes = modes(operators, n, solver=solver)
     of_air = np.zeros((n, n))
-    if air is not None:
-        hz, shapes = _with_added(operators, air.mass, hz, shapes)
+    if air is not None:  # by the Rayleigh-Ritz method
+        mass = np.eye(n) + _project(air.mass, shapes[operators.free])
+        squares, turn = linalg.eigh(np.diag((2 * np.pi * hz) ** 2), mass)
+        hz, shapes = np.sqrt(squares) / (2 * np.pi), shapes @ turn
         each = {name: _project(R, shapes[operators.free]) for name, R in air.resistances.items()}
         of_air = damping(np.diag((2 * np.pi * hz) ** 2), np.eye(n), each)
     part = membrane_part(mesh, membrane)
@@ -89,15 +90,6 @@ def stretching_modes(
         basis=shapes, hz=hz, H=H, left_out=left_out,
         elastic=modal_elastic(modal, H, membrane.material),
     )  # fmt: skip
-
-
-def _with_added(
-    operators: Operators, added: LinearOperator, hz: Floats, shapes: Floats
-) -> tuple[Floats, Floats]:
-    """Return the modes with an added mass, by the Rayleigh-Ritz method."""
-    mass = np.eye(len(hz)) + _project(added, shapes[operators.free])
-    squares, turn = linalg.eigh(np.diag((2 * np.pi * hz) ** 2), mass)
-    return np.sqrt(squares) / (2 * np.pi), shapes @ turn
 
 
 def _project(A: Any, shapes: Floats) -> Floats:

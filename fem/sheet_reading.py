@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from fem.elements import shape_functions, triangle_rule
 from fem.finite_strain import Membrane, Part, membrane_part
 from fem.load_and_probe import straight_coordinates
 from fem.sparsity import from_entries
 from fem.stress import fitted_polynomial
-from fem.typing import Floats, Ints
 from meshes import TetMesh
+from meshes.elements import shape_functions, triangle_rule
+from simple_model.typing import Floats, Ints
 
 PAIRS = ((0, 0), (1, 1), (0, 1))  # xx, yy, xy
 

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from fem.typing import Array, Bools, Floats, Index, Ints
 from meshes import MeshError
+from simple_model.typing import Array, Bools, Floats, Ints
 
+Index = NDArray[np.int32]  # columns and starts of rows
 UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and above the diagonal
 
 

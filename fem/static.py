@@ -11,7 +11,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from fem.assembly import Operators
 from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged
-from fem.typing import Floats
+from simple_model.typing import Floats
 
 
 def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floats:
@@ -22,7 +22,6 @@ def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floa
 
     Parameters
     ----------
-    operators : Operators
     force : (3 n,) or (3 n, k) float, N
     solver : backend of `factorise`
 
@@ -60,7 +59,6 @@ def modes(
 
     Parameters
     ----------
-    operators : Operators
     n : number of modes
     solver : backend of `factorise`
     most_restarts : of the Lanczos method

@@ -25,17 +25,17 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fem.assembly import by_region, direct_part, elements_of
-from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
 from fem.load_and_probe import locate, straight_coordinates
 from fem.maxwell import refuse_own_law
 from fem.pressure_projection import dilatation_operator
 from fem.sparsity import dofs_of, from_entries
-from fem.typing import Floats, Ints
 from meshes import TetMesh
+from meshes.elements import shape_functions, tetrahedron_rule
 from meshes.tetmesh import EDGES
 from simple_model.layers.material import Material
 from simple_model.layers.tensors import DIAGONAL, MEAN, TENSOR
+from simple_model.typing import Floats, Ints
 
 POINTS = 4  # quadrature points of an element, of the rule for degree 2
 

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import cg
 from fem.assembly import Operators
 from fem.linear_solver import factorise
 from fem.maxwell import branch_force, maxwell_only, relaxing_stiffness
-from fem.typing import Floats
+from simple_model.typing import Floats
 
 
 class Diverged(ArithmeticError):
@@ -56,7 +56,6 @@ def transient(
 
     Parameters
     ----------
-    operators : Operators
     force : function of the time in s that returns nodal forces (3 n,) in N
     dt : time step, s
     initial : state to start from; at rest at time 0 by default

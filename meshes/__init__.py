@@ -8,12 +8,12 @@ from meshes.shapes.structured import (
     Grading,
     block,
     extrude,
-    extruded,
+    extrude_plane,
     graded_axis,
     middle_plane,
     sheet,
 )
-from meshes.surface.repair import repaired
+from meshes.surface.repair import repair
 from meshes.surface.triangulation import Surface
 from meshes.tetmesh import (
     MeshError,
@@ -30,40 +30,13 @@ from meshes.volume.curving import curve_boundary
 from meshes.volume.fingertip import Fingertip, fingertip_mesh
 from meshes.volume.mapped_palm import mapped_palm
 from meshes.volume.quality import dihedral_angles, edge_lengths, jacobian_ratios
-from meshes.volume.tetrahedralise import graded, tetrahedralise
+from meshes.volume.tetrahedralise import graded_sizing, tetrahedralise
 
 __all__ = [
-    "Fingertip",
-    "Grading",
-    "MeshError",
-    "Palm",
-    "Surface",
-    "TetMesh",
-    "block",
-    "body_from_file",
-    "boundary_facets",
-    "corner_volumes",
-    "curve_boundary",
-    "dihedral_angles",
-    "edge_lengths",
-    "extrude",
-    "extruded",
-    "facet_set",
-    "fingertip_mesh",
-    "graded",
-    "graded_axis",
-    "half",
-    "interface_facets",
-    "jacobian_ratios",
-    "mapped_palm",
-    "middle_plane",
-    "part",
-    "quadratic",
-    "read",
-    "repaired",
-    "sheet",
-    "tag_boundary",
-    "tetrahedralise",
-    "visible_from_above",
+    "Fingertip", "Grading", "MeshError", "Palm", "Surface", "TetMesh", "block", "body_from_file",
+    "boundary_facets", "corner_volumes", "curve_boundary", "dihedral_angles", "edge_lengths",
+    "extrude", "extrude_plane", "facet_set", "fingertip_mesh", "graded_axis", "graded_sizing",
+    "half", "interface_facets", "jacobian_ratios", "mapped_palm", "middle_plane", "part",
+    "quadratic", "read", "repair", "sheet", "tag_boundary", "tetrahedralise", "visible_from_above",
     "write",
-]
+]  # fmt: skip

@@ -1,8 +1,8 @@
 """Disk cache of meshes and reduced bodies, so that each is computed once per machine.
 
 The name of each file is a hash of everything that its content depends on. Unreadable entries are
-misses. When all entries exceed `LIMIT` bytes, the least recently used are removed. The folder is
-that of the platform; `SKINWAVE_CACHE` names another, and an empty value disables the cache.
+misses. When all entries exceed 5 GiB, the least recently used are removed. The folder is that of
+the platform; `SKINWAVE_CACHE` names another, and an empty value disables the cache.
 """
 
 import contextlib
@@ -12,6 +12,7 @@ import os
 import re
 import tempfile
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,6 @@ import numpy as np
 
 from meshes import reading
 
-LIMIT = 5 * 2**30  # bytes of all entries
 ENTRY = re.compile(r"[0-9a-f]{32}(\.npz|\.\w+\.part)")  # names of entries and unfinished ones
 
 
@@ -73,8 +73,10 @@ def load(name: str) -> dict[str, Any] | None:
     return arrays | {"meta": meta}
 
 
-def store(name: str, meta: Any, **arrays: np.ndarray) -> None:
-    """Store an entry, unless the folder cannot be written or a number is not finite."""
+def store(name: str, meta: Any, arrays: Mapping[str, np.ndarray], limit: int = 5 * 2**30) -> None:
+    """Store an entry, unless the folder cannot be written or a number is not finite. All entries
+    together take at most `limit` bytes, or the newest one alone.
+    """
     home = folder()
     if home is None or not all(np.isfinite(array).all() for array in arrays.values()):
         return
@@ -89,7 +91,7 @@ def store(name: str, meta: Any, **arrays: np.ndarray) -> None:
         except BaseException:
             os.unlink(aside)
             raise
-        _keep_within(LIMIT, home, f"{name}.npz")
+        _keep_within(limit, home, f"{name}.npz")
 
 
 def _keep_within(limit: int, home: Path, newest: str) -> None:

@@ -27,14 +27,9 @@ def tag_boundary(
 
     Parameters
     ----------
-    mesh : TetMesh
     rest : name of the facets that belong to no part, optional
     parts : name -> mask (k,) of the boundary facets, or a function that computes it from their
         centroids (k, 3) and outward normals (k, 3). Parts may overlap.
-
-    Returns
-    -------
-    TetMesh
 
     >>> from meshes import block
     >>> mesh = block((0.02, 0.02, 0.01), 0.01)
@@ -75,11 +70,9 @@ def visible_from_above(mesh: TetMesh) -> np.ndarray:
 
 def heights_over(triangles: Floats, places: Floats) -> Floats:
     """Return the heights (m,) in m of triangles (m, 3, 3) above places (m, 2) or (2,), or -inf."""
-    flat = triangles[..., :2] - places[..., None, :]
-    x, y = flat[..., 0], flat[..., 1]
-    share = np.stack(
-        [x[:, b] * y[:, c] - x[:, c] * y[:, b] for b, c in ((1, 2), (2, 0), (0, 1))], axis=1
-    )
+    x, y = np.moveaxis(triangles[..., :2] - places[..., None, :], 2, 0)
+    share = np.roll(x, -1, axis=1) * np.roll(y, 1, axis=1)
+    share -= np.roll(x, 1, axis=1) * np.roll(y, -1, axis=1)
     total = share.sum(axis=1)
     over = (share * np.sign(total)[:, None] >= 0).all(axis=1) & (total != 0)
     weights = share / np.where(total == 0, 1, total)[:, None]

@@ -15,7 +15,6 @@ import numpy as np
 from meshes.typing import Array
 
 LARGEST_TEXT = 16_000_000  # bytes
-MOST_UNPACKED = 500_000_000  # bytes of an unpacked archive
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")  # characters that text files do not have
 
@@ -58,9 +57,9 @@ def read_bytes(path: PathLike, limit: int) -> bytes:
             raise ValueError(f"{path}: cannot be read ({_reason(error)}); check it") from None
 
 
-def read_text(path: PathLike, limit: int = LARGEST_TEXT, must: str = "text in UTF-8") -> str:
-    """Return the UTF-8 text of a file of at most `limit` bytes; see `decode`."""
-    content = read_bytes(path, limit)
+def read_text(path: PathLike, must: str = "text in UTF-8") -> str:
+    """Return the UTF-8 text of a file; see `decode`."""
+    content = read_bytes(path, LARGEST_TEXT)
     try:
         return decode(content, must)
     except ValueError as error:
@@ -101,12 +100,13 @@ def read_exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
     raise ValueError(f"{path}: the file is not text; export it as UTF-8 text, or give its format")
 
 
-def load_arrays(path: PathLike) -> dict[str, Array]:
-    """Return the arrays of an .npz file by name; raise a ValueError if it unpacks to too much."""
-    most_growth = 8  # times the size of a larger archive
+def load_arrays(path: PathLike, most: int = 500_000_000) -> dict[str, Array]:
+    """Return the arrays of an .npz file by name; raise a ValueError if it unpacks to more than
+    `most` bytes and to eight times its size.
+    """
     with open_regular(path) as file:
         try:
-            limit = max(MOST_UNPACKED, most_growth * os.fstat(file.fileno()).st_size)
+            limit = max(most, 8 * os.fstat(file.fileno()).st_size)
             with zipfile.ZipFile(file) as archive:
                 size = sum(member.file_size for member in archive.infolist())
             if size > limit:

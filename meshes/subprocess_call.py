@@ -17,9 +17,6 @@ from typing import TypeVar
 
 from meshes.tetmesh import MeshError
 
-# Limits for reading a file: constant part, and part per megabyte or byte of its size.
-LEAST_SECONDS, SECONDS = 60.0, 1.0
-LARGEST = 2_000_000_000  # bytes of a file
 T = TypeVar("T")
 
 
@@ -73,15 +70,23 @@ def call(function: Callable[..., T], *args: object, timeout: float, memory: int 
     return value
 
 
-def call_reader(function: Callable[[Path], T], path: Path) -> T:
-    """Call a function that reads a file in a new process, with limits that grow with its size."""
+def call_reader(
+    function: Callable[[Path], T],
+    path: Path,
+    *,
+    largest: int = 2_000_000_000,
+    least_seconds: float = 60.0,
+    seconds_per_mb: float = 1.0,
+) -> T:
+    """Call a function that reads a file of at most `largest` bytes in a new process, with limits of
+    time and memory that grow with its size.
+    """
     size = path.stat().st_size
-    if size > LARGEST:
+    if size > largest:
         raise MeshError(
-            f"{path} has {size / 1e6:,.0f} MB, more than the limit of {LARGEST / 1e6:,.0f} MB"
+            f"{path} has {size / 1e6:,.0f} MB, more than the limit of {largest / 1e6:,.0f} MB"
         )
-    least_bytes, bytes_each = 800_000_000, 20
-    seconds, memory = LEAST_SECONDS + SECONDS * size / 1e6, least_bytes + bytes_each * size
+    seconds, memory = least_seconds + seconds_per_mb * size / 1e6, 800_000_000 + 20 * size
     try:
         return call(function, path.resolve(), timeout=seconds, memory=memory)
     except TimeoutError:

@@ -74,11 +74,12 @@ class TetMesh:
         facets = {name: _facets(name, nodes, points, tets) for name, nodes in self.facets.items()}
         for array in (points, tets, region, *facets.values()):
             array.setflags(write=False)
-        object.__setattr__(self, "points", points)
-        object.__setattr__(self, "tets", tets)
-        object.__setattr__(self, "region", region)
-        object.__setattr__(self, "facets", MappingProxyType(facets))
-        object.__setattr__(self, "region_names", MappingProxyType(dict(self.region_names)))
+        values = {
+            "points": points, "tets": tets, "region": region, "facets": MappingProxyType(facets),
+            "region_names": MappingProxyType(dict(self.region_names)),
+        }  # fmt: skip
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         sets = f"; facets {', '.join(sorted(self.facets))}" if self.facets else ""

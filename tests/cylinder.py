@@ -33,7 +33,7 @@ def disc(body: Body, h: float) -> TetMesh:
     area = (q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0])
     triangles = triangles[abs(area) > SHORT * body.width**2]
     z = np.linspace(-body.depth, 0.0, max(2, round(body.depth / h)) + 1)
-    mesh = meshes.extruded(plane, triangles, z)
+    mesh = meshes.extrude_plane(plane, triangles, z)
     return meshes.tag_boundary(
         mesh,
         bottom=lambda centroids, normals: normals[:, 2] < -0.9,

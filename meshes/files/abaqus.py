@@ -22,7 +22,7 @@ from meshes.typing import Floats
 INCLUDED = (
     r"(?im)^[ \t]*\*(?:INCLUDE|NODE|ELEMENT|ELSET)\b[^\n]*,\s*INPUT\s*=\s*\"?(?P<file>[^\",\n]+).*"
 )
-AGAIN = "save it again from the program that made it"
+SAVE_AGAIN = "save it again from the program that made it"
 
 Rows = list[list[str]]
 
@@ -56,7 +56,7 @@ def read_abaqus(path: Path) -> Any:
         elif keyword == "INSTANCE":
             name = options.get("PART", "")
             if name.upper() not in parts:
-                raise MeshError(f"{path} has an instance of a missing part '{name}'; {AGAIN}")
+                raise MeshError(f"{path} has an instance of a missing part '{name}'; {SAVE_AGAIN}")
             current = deepcopy(parts[name.upper()])  # an instance may add nodes and elements
             instances.append((current, rows))
         elif keyword in ("END PART", "END INSTANCE"):
@@ -65,17 +65,17 @@ def read_abaqus(path: Path) -> Any:
             try:
                 _add(current, keyword, options, rows)
             except (ValueError, IndexError):
-                raise MeshError(f"{path}: wrong numbers below *{keyword}; {AGAIN}") from None
+                raise MeshError(f"{path}: wrong numbers below *{keyword}; {SAVE_AGAIN}") from None
     placed = [(loose, []), *instances] if instances else [(p, []) for p in (loose, *parts.values())]
     return join_parts(path, [(part, rows) for part, rows in placed if part.elements])
 
 
-def expanded(path: Path, pattern: str = "(?!)", level: int = 0) -> str:
+def full_text(path: Path, pattern: str = "(?!)", level: int = 0) -> str:
     """Return the text of a file with the files that a pattern includes, by its group `file`."""
 
     def other(match: re.Match[str]) -> str:
         before = "" if "INCLUDE" in match[0].upper() else match[0] + "\n"
-        return before + expanded(include(path, match["file"].strip(), level), pattern, level + 1)
+        return before + full_text(include(path, match["file"].strip(), level), pattern, level + 1)
 
     largest = 500_000_000  # bytes
     try:
@@ -95,7 +95,7 @@ def include(path: Path, name: str, level: int = 0) -> Path:
 
 def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], Rows]]:
     """Each keyword with its options and the data lines below it."""
-    text = re.sub(r"(?m)^[ \t]*\*\*.*", "", expanded(path, INCLUDED))  # comments
+    text = re.sub(r"(?m)^[ \t]*\*\*.*", "", full_text(path, INCLUDED))  # comments
     for block in re.split(r"(?m)^[ \t]*\*", text):
         head, *lines = [line.strip() for line in block.splitlines() if line.strip()] or [""]
         while head.endswith(",") and lines:  # a keyword line continues after a comma
@@ -151,10 +151,10 @@ def join_parts(path: Path, placed: list[tuple[Part, Rows]]) -> Any:
     notes: list[str] = []
     for part, rows in placed:
         number = dict(zip(part.nodes, count(sum(map(len, points))), strict=False))
-        points.append(_move(path, np.array(list(part.nodes.values())).reshape(-1, 3), rows))
+        points.append(_place(path, np.array(list(part.nodes.values())).reshape(-1, 3), rows))
         region = _regions(part, names, notes)
         for element, (kind, nodes) in part.elements.items():
-            name = _kind(kind, len(nodes))
+            name = _meshio_kind(kind, len(nodes))
             if name is None:
                 left_out.append(kind)
                 continue
@@ -162,7 +162,7 @@ def join_parts(path: Path, placed: list[tuple[Part, Rows]]) -> Any:
                 cells.setdefault(name, []).append([number[node] for node in nodes])
             except KeyError as error:
                 raise MeshError(
-                    f"{path} has an element {element} with a missing node {error}; {AGAIN}"
+                    f"{path} has an element {element} with a missing node {error}; {SAVE_AGAIN}"
                 ) from None
             regions.setdefault(name, []).append(region.get(element, 0))
     notes = list(dict.fromkeys(notes))  # instances of one part have the same notes
@@ -177,7 +177,7 @@ def join_parts(path: Path, placed: list[tuple[Part, Rows]]) -> Any:
     )
 
 
-def _kind(kind: str, nodes: int) -> str | None:
+def _meshio_kind(kind: str, nodes: int) -> str | None:
     """meshio's name of an element type with this number of nodes; None if unknown."""
     solids = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10"}  # by nodes
     if expected := _solid_nodes(kind):
@@ -215,7 +215,7 @@ def _regions(part: Part, names: dict[str, int], notes: list[str]) -> dict[int, i
     return {element: names[title] for title, members in regions.items() for element in members}
 
 
-def _move(path: Path, points: Floats, rows: Rows) -> Floats:
+def _place(path: Path, points: Floats, rows: Rows) -> Floats:
     """Points after the translation and the rotation (axis and degrees) of an instance."""
     from scipy.spatial.transform import Rotation
 
@@ -229,6 +229,6 @@ def _move(path: Path, points: Floats, rows: Rows) -> Floats:
             points = a + Rotation.from_rotvec(np.radians(angle) * axis).apply(points - a)
     except (ValueError, IndexError):
         raise MeshError(
-            f"{path} has an instance whose translation or rotation is not valid; {AGAIN}"
+            f"{path} has an instance whose translation or rotation is not valid; {SAVE_AGAIN}"
         ) from None
     return np.asarray(points)

@@ -15,9 +15,6 @@ from meshes.tetmesh import EDGES, FACES, MeshError, corner_volumes, facet_keys
 from meshes.typing import Floats, Ints
 
 FACETS, REGION, NAMED = "facets:", "region ", "region:"
-# Cell arrays with region numbers, of this package, of others, and of meshio's readers.
-PHYSICAL = "gmsh:physical"
-NO_REGIONS = re.compile(rf"{FACETS}|{NAMED}|.*(ghost|rank|partition|process)", re.IGNORECASE)
 
 # Corners of the faces of the solid elements that are split into tetrahedra.
 SPLIT = {
@@ -27,6 +24,7 @@ SPLIT = {
     "pyramid": [[0, 3, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
 }  # fmt: skip
 SOLID = ("tetra", "tetra10", *SPLIT)
+GMSH_GROUPS = "gmsh:physical"  # cell array of meshio
 PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  # corners
 
 
@@ -70,21 +68,22 @@ def contents(path: Path, raw: Any) -> Contents:
         raise MeshError(
             f"{path} has unsupported cells ({listed}); save only 4- or 10-node tetrahedra"
         )
-    meshed = "make a closed surface of them, as by screened Poisson reconstruction in MeshLab"
     if not solid and cells.keys().isdisjoint(PLANE):
         what = "no triangles and no solid elements; give a file with a body"
         if len(raw.points) and cells.keys() <= {"vertex"}:
-            what = f"{len(raw.points):,} points without triangles; {meshed}"
+            what = (
+                f"{len(raw.points):,} points without triangles; make a closed surface of them, as "
+                "by screened Poisson reconstruction in MeshLab"
+            )
         raise MeshError(f"{path} has {what}")
-    notes = [
-        f"left out {len(cells[kind]):,} cells of type {kind}" for kind in smaller if kind in cells
-    ]
+    left_out = {kind: len(cells[kind]) for kind in smaller if kind in cells}
+    notes = [f"left out {count:,} cells of type {kind}" for kind, count in left_out.items()]
     notes = [*raw.info["notes"], *notes]
     points = np.zeros((len(raw.points), 3))
     points[:, : raw.points.shape[1]] = raw.points
     if solid:
         return _tetrahedra(path, raw, cells, points, notes)
-    fans = [_fan(cells[kind], PLANE[kind])[0] for kind in PLANE if kind in cells]
+    fans = [_triangles_of(cells[kind], PLANE[kind])[0] for kind in PLANE if kind in cells]
     return Contents(points=points, triangles=np.vstack(fans), notes=notes)
 
 
@@ -104,7 +103,7 @@ def _tetrahedra(
     if count := len(used) - len(np.unique(merged[used])):
         notes.append(f"merged {count:,} nodes that coincide with others, as where bodies touch")
     names = {abs(number): name for number, name in raw.info["names"].items()}
-    tag = _tag(raw.cell_data_dict, solid, notes)
+    tag = _region_array(raw.cell_data_dict, solid, notes)
     parts: list[tuple[Ints, Ints]] = []
     for kind in solid:
         nodes, (own, titles) = merged[cells[kind]], _regions(raw, kind, tag)
@@ -122,7 +121,7 @@ def _tetrahedra(
     if not proper.all():
         notes.append(f"left out {(~proper).sum():,} tetrahedra with a repeated node")
     tets, region = tets[proper], region[proper]
-    once = _once(tets, region)
+    once = _first_of_duplicates(tets, region)
     if len(once) < len(tets):
         several = len(np.unique(region)) > 1
         notes.append(
@@ -143,7 +142,7 @@ def _tetrahedra(
     )
 
 
-def _once(tets: Ints, region: Ints) -> Ints:
+def _first_of_duplicates(tets: Ints, region: Ints) -> Ints:
     """Ascending numbers of tetrahedra; of duplicates, the one in the smallest region remains."""
     _, place, count = np.unique(region, return_inverse=True, return_counts=True)
     order = np.argsort(count[place], kind="stable")
@@ -151,7 +150,7 @@ def _once(tets: Ints, region: Ints) -> Ints:
     return np.sort(order[first])
 
 
-def _fan(nodes: Ints, corners: int) -> tuple[Ints, Ints]:
+def _triangles_of(nodes: Ints, corners: int) -> tuple[Ints, Ints]:
     """Triangles (k, 3) of plane cells, split at their lowest node number, and their cell (k,)."""
     if corners == 3:
         return nodes[:, :3], np.arange(len(nodes))
@@ -170,7 +169,7 @@ def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, In
     """
     least, tets, cells = nodes.min(axis=1), [], []
     for face in SPLIT[kind]:
-        triangles, cell = _fan(nodes[:, face], len(face))
+        triangles, cell = _triangles_of(nodes[:, face], len(face))
         away = (nodes[cell][:, face] != least[cell, None]).all(axis=1)
         tets.append(np.column_stack([least[cell], triangles])[away])
         cells.append(cell[away])
@@ -188,7 +187,7 @@ def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, In
     return parts[solid], cell[solid]
 
 
-def _tag(arrays: Arrays, solid: list[str], notes: list[str]) -> str:
+def _region_array(arrays: Arrays, solid: list[str], notes: list[str]) -> str:
     """Name of the cell array with the regions of solid cells, or "": one of the usual names, or the
     first with a few whole numbers.
     """
@@ -197,26 +196,28 @@ def _tag(arrays: Arrays, solid: list[str], notes: list[str]) -> str:
         name: x for name, x in every.items()
         if x.ndim == 1 and (np.floor(x) == x).all() and np.abs(x).max() < 2**31
     }  # fmt: skip
-    numbered = ("region", "material", "medit:ref", "cell_tags", PHYSICAL)
-    usual = [name for name in numbered if name in numbers]
-    if usual and (usual[0] != PHYSICAL or numbers[PHYSICAL].any()):
-        return usual[0]
+    # Of this package, of others, and of meshio's readers.
+    usual = ("region", "material", "medit:ref", "cell_tags", GMSH_GROUPS)
+    known = next((name for name in usual if name in numbers), "")
+    if known and (known != GMSH_GROUPS or numbers[known].any()):
+        return known
+    others = rf"(?i){FACETS}|{NAMED}|.*(ghost|rank|partition|process)"
     several = [
         name for name, x in numbers.items()
-        if not NO_REGIONS.match(name) and 1 < len(np.unique(x)) <= len(x) / 2
+        if not re.match(others, name) and 1 < len(np.unique(x)) <= len(x) / 2
     ]  # fmt: skip
     found = next((name for name in several if numbers[name].min() >= 0), "")
     if found:
         notes.append(f"regions are the numbers in the cell array {found}")
-    if others := [name for name in several if name != found]:
-        notes.append(f"left out the cell arrays {', '.join(others)}")
+    if unused := [name for name in several if name != found]:
+        notes.append(f"left out the cell arrays {', '.join(unused)}")
     return found
 
 
 def _regions(raw: Any, kind: str, tag: str) -> tuple[Ints, dict[int, str]]:
     """Region (e,) of each element from an array or physical groups, and its names."""
     arrays = raw.cell_data_dict
-    if tag == PHYSICAL:
+    if tag == GMSH_GROUPS:
         return _physical_groups(raw, arrays[tag][kind])
     if not tag:
         return np.zeros(len(raw.cells_dict[kind]), np.int64), {}
@@ -273,7 +274,7 @@ def _facet_sets(
 
 def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, np.ndarray, Ints]:
     """Faces (k, width) of tetrahedra that match plane cells, a mask of matches, and their cells."""
-    triangles, cell = _fan(nodes, corners)
+    triangles, cell = _triangles_of(nodes, corners)
     n = int(tets.max()) + 1
     faces = tets[:, FACES[:, :width]].reshape(-1, width)
     keys, place, count = np.unique(facet_keys(faces, n), return_index=True, return_counts=True)

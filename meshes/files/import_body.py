@@ -20,12 +20,18 @@ from meshes.surface.alignment import (
     rotation_to_z,
     shift_to_origin,
 )
-from meshes.surface.repair import check, in_mm, repaired
+from meshes.surface.repair import check, in_mm, repair
 from meshes.surface.triangulation import Surface, compact, volume
 from meshes.surface.winding import check_inside
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
 from meshes.volume.quality import check_one_body, dihedral_angles, edge_lengths
-from meshes.volume.tetrahedralise import EPSILON, REST, check_size, graded, tetrahedralise
+from meshes.volume.tetrahedralise import (
+    EPSILON,
+    REST,
+    check_edge_length,
+    graded_sizing,
+    tetrahedralise,
+)
 
 FINE_RADIUS = 30e-3  # m about the middle of the palm, within which elements have the size h
 GROWTH = 1.25  # of elements beyond it: size ratio of neighbours
@@ -83,7 +89,7 @@ def body_from_file(
     scale, contents = scale_of(unit), read_contents(path)
     for note in contents.notes:
         say(note)
-    _check_plausible(path, contents, unit)
+    _check_size_of_hand(path, contents, unit)
     if len(contents.tets):
         if clip is not None or inner:
             raise MeshError(
@@ -107,10 +113,9 @@ def body_from_file(
         planes = list(clip)
         bones = {name: cut for name, bone in bones.items() if (cut := cut_to_box(bone, clip)[0])}
     progress("filling it with tetrahedra", 0.0)
-    check_size(surface, "h", h)
-    coarsest = 2.0  # largest elements over h
-    grading = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest * h)
-    mesh = tetrahedralise(surface, h, inner=bones, sizing=graded(h, grading), timeout=timeout)
+    check_edge_length(surface, "h", h)
+    sizing = graded_sizing(h, Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=2 * h))
+    mesh = tetrahedralise(surface, h, inner=bones, sizing=sizing, timeout=timeout)
     return _with_summary(_with_sides(mesh, planes, 2 * EPSILON * h), say)
 
 
@@ -137,7 +142,7 @@ def _inner_surfaces(
     return surfaces
 
 
-def _check_plausible(path: PathLike, contents: Contents, unit: str) -> None:
+def _check_size_of_hand(path: PathLike, contents: Contents, unit: str) -> None:
     """Check that a body has the size of a hand, or of part of one, in the unit of its file."""
     used = contents.points[np.unique(contents.tets if len(contents.tets) else contents.triangles)]
     size = float(np.linalg.norm(np.ptp(used, axis=0)))
@@ -165,7 +170,7 @@ def _sound_surface(
     """Surface in a file, in m, rotated, repaired and checked."""
     say(f"read {len(contents.triangles):,} triangles and {len(contents.points):,} points")
     points = contents.points * scale @ rotation_to_z(up).T
-    surface, notes = repaired(points, contents.triangles, keep_largest=keep_largest, cap=cap)
+    surface, notes = repair(points, contents.triangles, keep_largest=keep_largest, cap=cap)
     for note in notes:
         say(note)
     check(surface)
@@ -189,7 +194,7 @@ def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 
     visible = visible_from_above(mesh)
     sides = {"top": visible}
     if planes:
-        is_cut = on_planes(planes, tolerance)(*geometry(mesh, boundary_facets(mesh.tets)))
+        is_cut = on_planes(planes, tolerance, *geometry(mesh, boundary_facets(mesh.tets)))
         sides = {"cut": is_cut, "top": visible & ~is_cut}
     tagged = tag_boundary(mesh, rest="bottom", **sides)
     return replace(mesh, facets={**tagged.facets, **mesh.facets})

@@ -19,14 +19,13 @@ import numpy as np
 
 from meshes import subprocess_call
 from meshes.files.cells import FACETS, NAMED, REGION, Contents
-from meshes.files.readers import BY_MESHIO, OTHERWISE, OWN, read_file
+from meshes.files.readers import BY_MESHIO, OWN, SAVE_OTHERWISE, read_file
 from meshes.tetmesh import MeshError, TetMesh
 
-BY_VTK = (
+FORMATS = (
     ".vtu", ".pvtu", ".vtk", ".vtm", ".vtkhdf", ".xdmf", ".xmf", ".exo", ".e", ".vtp", ".stl",
-    ".ply", ".obj", ".glb", ".gltf",
+    ".ply", ".obj", ".glb", ".gltf", *BY_MESHIO, *OWN,
 )  # fmt: skip
-FORMATS = (*BY_VTK, *BY_MESHIO, *OWN)
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # gmsh cannot read the version 4.1 of meshio
 
@@ -50,7 +49,7 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
     except subprocess_call.Crashed:
         raise MeshError(
             f"{path} ended its reader: it is cut short, or of a variant that is not read; "
-            f"{OTHERWISE}"
+            f"{SAVE_OTHERWISE}"
         ) from None
     except MeshError as error:
         raise MeshError(str(error).replace(str(path.resolve()), str(path))) from None
@@ -80,10 +79,6 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
     ----------
     path : file in one of `FORMATS`
     unit : unit of the coordinates in the file: m, cm, mm, um or in
-
-    Returns
-    -------
-    TetMesh
 
     Raises a MeshError if the file cannot be read, has no solid elements, or has an unknown node
     order.

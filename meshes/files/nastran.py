@@ -10,11 +10,14 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from meshes.files.abaqus import AGAIN, Part, expanded, join_parts
+from meshes.files.abaqus import SAVE_AGAIN, Part, full_text, join_parts
 from meshes.tetmesh import MeshError
 
-SOLIDS = {"CTETRA": (4, 10), "CPYRAM": (5, 13), "CPENTA": (6, 15), "CHEXA": (8, 20)}  # nodes
-SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}  # corners
+# Corners of elements, and the most nodes of solid ones, 0 for shells.
+ELEMENTS = {
+    "CTETRA": (4, 10), "CPYRAM": (5, 13), "CPENTA": (6, 15), "CHEXA": (8, 20), "CTRIA3": (3, 0),
+    "CTRIAR": (3, 0), "CTRIA6": (3, 0), "CQUAD4": (4, 0), "CQUADR": (4, 0), "CQUAD8": (4, 0),
+}  # fmt: skip
 INCLUDED = r"(?im)^INCLUDE\s+['\"]?(?P<file>[^'\"\n]+).*"
 
 
@@ -32,17 +35,17 @@ def read_nastran(path: Path) -> Any:
                 part.nodes[int(fields[0])] = [_number(word) for word in fields[2:5]]
             elif name[0] == "C" and not name.startswith("CORD"):
                 part.elements[number := int(fields[0])] = _element(name, fields)
-                if name in SOLIDS or name in SHELLS:
+                if name in ELEMENTS:
                     part.sections.append(str(int(fields[1] or 0)))
                     part.sets.setdefault(part.sections[-1], set()).add(number)
         except (ValueError, IndexError):
-            raise MeshError(f"{path}: wrong numbers on a card {name}; {AGAIN}") from None
+            raise MeshError(f"{path}: wrong numbers on a card {name}; {SAVE_AGAIN}") from None
     return join_parts(path, [(part, [])])
 
 
 def _element(name: str, fields: list[str]) -> tuple[str, list[int]]:
     """Abaqus' name of an element, and its nodes; those on edges only if none is missing."""
-    corners, most = SOLIDS.get(name) or (SHELLS.get(name, 0), 0)
+    corners, most = ELEMENTS.get(name, (0, 0))
     nodes = [int(word or 0) for word in fields[2 : 2 + max(corners, most)]]
     nodes = nodes if len(nodes) == most and all(nodes) else nodes[:corners]
     return f"{'C3D' if most else 'S'}{len(nodes)}" if corners else name, nodes
@@ -50,7 +53,7 @@ def _element(name: str, fields: list[str]) -> tuple[str, list[int]]:
 
 def _cards(path: Path) -> Iterator[tuple[str, list[str]]]:
     """Name of each card, and its fields with those of continuations."""
-    text = re.sub(r"[ ]*\$.*", "", expanded(path, INCLUDED))  # comments
+    text = re.sub(r"[ ]*\$.*", "", full_text(path, INCLUDED))  # comments
     text = re.split(r"(?im)^ENDDATA", re.split(r"(?im)^BEGIN[^\n]*", text)[-1])[0]
     name, fields = "$", list[str]()
     for line in filter(str.strip, text.splitlines()):

@@ -16,14 +16,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from meshes.files.abaqus import AGAIN, expanded, include, read_abaqus
+from meshes.files.abaqus import SAVE_AGAIN, full_text, include, read_abaqus
 from meshes.files.cells import Contents, contents
 from meshes.files.nastran import read_nastran
 from meshes.tetmesh import MeshError
 from meshes.typing import Floats
 
 BY_MESHIO = {".msh": "gmsh", ".mesh": "medit", ".med": "med", ".off": "off"}
-OTHERWISE = "save it as .vtu (ParaView, meshio convert) or .msh (gmsh)"
+SAVE_OTHERWISE = "save it as .vtu (ParaView, meshio convert) or .msh (gmsh)"
 
 
 def read_file(path: Path) -> Contents:
@@ -36,7 +36,7 @@ def read_file(path: Path) -> Contents:
             warnings.simplefilter("always")
             raw = _read(path)
             if any("error while reading" in str(one.message) for one in caught):
-                raise MeshError(f"{path} is damaged or cut short; {AGAIN}")
+                raise MeshError(f"{path} is damaged or cut short; {SAVE_AGAIN}")
             return contents(path, raw)
     except MeshError:
         raise
@@ -53,7 +53,11 @@ def read_file(path: Path) -> Contents:
         why = "is cut short, or of a variant that is not read"
         if isinstance(error, MemoryError):
             why = "needs more memory than a mesh of its size should"
-        cure = "save it as version 2.2 (gmsh -format msh22)" if path.suffix == ".msh" else OTHERWISE
+        cure = (
+            "save it as version 2.2 (gmsh -format msh22)"
+            if path.suffix == ".msh"
+            else SAVE_OTHERWISE
+        )
         raise MeshError(f"{path} cannot be read: it {why}; {cure}") from None
 
 
@@ -80,7 +84,7 @@ def _check_gmsh(path: Path) -> None:
     content = path.read_bytes()
     if b"$EndElements" not in content:
         raise MeshError(
-            f"{path} is cut short or not a gmsh mesh, because it has no $EndElements; {AGAIN}"
+            f"{path} is cut short or not a gmsh mesh, because it has no $EndElements; {SAVE_AGAIN}"
         )
     if b"$PartitionedEntities" in content:
         raise MeshError(f"{path} is partitioned; save it without partitions, or as version 2.2")
@@ -103,7 +107,7 @@ def _read_tetgen(path: Path) -> Any:
 
 def _numbers(path: Path, end: str, head: int) -> tuple[int, Floats]:
     """The second of `head` numbers in the first line of one of TetGen's files, and its rows."""
-    words = re.sub(r"#.*", "", expanded(include(path, path.with_suffix(end).name))).split()
+    words = re.sub(r"#.*", "", full_text(include(path, path.with_suffix(end).name))).split()
     return int(words[1]), np.array(words[head:], np.float64).reshape(int(words[0]), -1)
 
 

@@ -65,10 +65,6 @@ def sheet(
     order : 1 or 2, four- or ten-node tetrahedra
     planes : places in m along x and along y where grid lines must lie
 
-    Returns
-    -------
-    TetMesh
-
     Raises a MeshError if a length is not above 0 or there are too many cells.
 
     >>> sheet(0.1, 0.08, 1e-3, 0.01)
@@ -94,10 +90,6 @@ def block(
     h : float, m, largest side of a cell, under the focus if graded
     grading : growth of cells away from the focus; None for equal cells
     order : 1 or 2, four- or ten-node tetrahedra
-
-    Returns
-    -------
-    TetMesh
 
     Raises a MeshError if a length is not above 0 or there are too many cells.
 
@@ -145,9 +137,9 @@ def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = 
             raise MeshError(f"{name} = {length} m of a disc must be finite and above 0")
     rings, layers = (max(2, round_up(length / h)) for length in (diameter / 2, thickness))
     down = with_planes(np.linspace(0.0, thickness, layers + 1), planes)
-    check_size((2 * rings, 2 * rings, len(down) - 1), order=2)
+    check_cell_count((2 * rings, 2 * rings, len(down) - 1), order=2)
     plane, triangles = _rings(rings)
-    mesh = extruded(plane * diameter / 2, triangles, -down[::-1])
+    mesh = extrude_plane(plane * diameter / 2, triangles, -down[::-1])
     return tag_boundary(
         mesh,
         bottom=lambda centroids, normals: normals[:, 2] < -0.9,
@@ -183,7 +175,7 @@ def graded_axis(length: float, h: float, grading: Grading) -> Floats:
     """
     _check_lengths(length, h)
     fine = min(grading.radius, length)
-    check_size((fine / h, 1, 1))
+    check_cell_count((fine / h, 1, 1))
     cells = [fine / n] * n if (n := round_up(fine / h)) else []
     rest, size, reached = length - fine, h, 0.0
     tail: list[float] = []
@@ -191,7 +183,7 @@ def graded_axis(length: float, h: float, grading: Grading) -> Floats:
         size = min(size * grading.growth if tail or cells else size, grading.coarsest)
         tail.append(size)
         reached += size
-        check_size((len(cells) + len(tail), 1, 1))
+        check_cell_count((len(cells) + len(tail), 1, 1))
     if tail:
         # Drop the last cell if it is mostly beyond the end, and scale the growing ones.
         tail = tail[:-1] if len(tail) > 1 and reached - rest > tail[-1] / 2 else tail
@@ -237,7 +229,7 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
             raise MeshError(f"grid lines along {name} must be two or more increasing numbers")
     if order not in (1, 2):
         raise MeshError(f"order = {order} is not supported; use 1 or 2")
-    check_size((len(line) - 1 for line in lines), order)
+    check_cell_count((len(line) - 1 for line in lines), order)
     triangles = _rectangle_triangles(*lines[:2])
     yy, xx = np.meshgrid(lines[1], lines[0], indexing="ij")
     points, tets = _layers(np.column_stack([xx.ravel(), yy.ravel()]), triangles, lines[2])
@@ -245,7 +237,9 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
     return quadratic(mesh) if order == 2 else mesh
 
 
-def extruded(plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
+def extrude_plane(
+    plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int = 2
+) -> TetMesh:
     """Return tetrahedra on any triangulated plane, with the facet set `top`.
 
     Parameters
@@ -254,9 +248,6 @@ def extruded(plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int
     triangles : (k, 3) int, nodes of the plane
     z : increasing heights of the layers, m
     order : 1 or 2, four- or ten-node tetrahedra
-    Returns
-    -------
-    TetMesh
     """
     ranked = np.sort(np.asarray(triangles), axis=1)  # the same order everywhere: neighbours conform
     points, tets = _layers(np.asarray(plane), ranked, np.asarray(z))
@@ -306,23 +297,22 @@ def _sides(points: Floats, facets: Ints) -> dict[str, Ints]:
     """Facet sets of a box by the plane in which each facet lies."""
     corners = points[facets]
     low, high = points.min(axis=0), points.max(axis=0)
-    planes = [("left", 0, low), ("right", 0, high), ("front", 1, low), ("back", 1, high)]
-    planes += [("bottom", 2, low), ("top", 2, high)]
+    names = (("left", "right"), ("front", "back"), ("bottom", "top"))
     sets = {
-        name: facets[(corners[..., axis] == end[axis]).all(axis=1)] for name, axis, end in planes
-    }
-    sets["sides"] = np.vstack([sets[name] for name in ("left", "right", "front", "back")])
-    return sets
+        name: facets[(corners[..., axis] == end[axis]).all(axis=1)]
+        for axis, pair in enumerate(names) for name, end in zip(pair, (low, high), strict=True)
+    }  # fmt: skip
+    return sets | {"sides": np.vstack([sets[name] for pair in names[:2] for name in pair])}
 
 
 def _cells(length: float, h: float, *, least: int = 2) -> Floats:
     """Equal cells no larger than h about the origin, in multiples of `least`."""
     _check_lengths(length, h)
-    check_size((length / h, 1, 1))
+    check_cell_count((length / h, 1, 1))
     return np.linspace(-length / 2, length / 2, least * max(1, round_up(length / (least * h))) + 1)
 
 
-def check_size(cells: Iterable[float], order: int = 2, most: int = 3_000_000) -> None:
+def check_cell_count(cells: Iterable[float], order: int = 2, most: int = 3_000_000) -> None:
     """Refuse numbers of cells along the three axes that give more than `most` degrees of freedom,
     by default as many as a workstation can factorise.
     """

@@ -1,14 +1,15 @@
 """Alignment of a surface with the device: rotation, centring and clipping."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from meshes.facets import Predicate, heights_over
-from meshes.surface.repair import repaired
+from meshes.facets import heights_over
+from meshes.surface.repair import repair
 from meshes.surface.triangulation import Surface, compact, n_pieces, pieces
 from meshes.tetmesh import MeshError
-from meshes.typing import Floats
+from meshes.typing import Bools, Floats
 
 ROTATIONS = {  # each about one axis; the rows are the new x, y and z
     "+z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -31,7 +32,7 @@ def align(surface: Surface) -> tuple[Surface, Floats]:
     """Move the top above the widest circle to the origin; return surface and shift (3,) in m."""
     x, y, _ = widest_circle(surface)
     shift = -np.array([x, y, height_at(surface, x, y)])
-    return Surface(points=surface.points + shift, triangles=surface.triangles), shift
+    return replace(surface, points=surface.points + shift), shift
 
 
 def shift_to_origin(surface: Surface) -> Floats:
@@ -134,17 +135,15 @@ def cut_to_box(surface: Surface, box: Sequence[float]) -> tuple[Surface | None, 
     if not cuts:
         return surface, 0
     triangles = np.asarray(body.faces).reshape(-1, 4)[:, 1:]
-    return repaired(np.asarray(body.points, np.float64), triangles)[0], cuts
+    return repair(np.asarray(body.points, np.float64), triangles)[0], cuts
 
 
-def on_planes(box: Sequence[float], tolerance: float) -> Predicate:
-    """Return a predicate for `tag_boundary` of the facets on the sides of a box, in m."""
-
-    def cut(centroids: Floats, normals: Floats) -> np.ndarray:
-        selected = np.zeros(len(centroids), bool)
-        for axis, sign, place in zip((0, 0, 1, 1), (-1, 1, -1, 1), box, strict=True):
-            near = np.abs(centroids[:, axis] - place) <= tolerance
-            selected |= near & (sign * normals[:, axis] > 0.9)
-        return selected
-
-    return cut
+def on_planes(box: Sequence[float], tolerance: float, centroids: Floats, normals: Floats) -> Bools:
+    """Return a mask (k,) of the facets within a tolerance in m of the sides of a box, given their
+    centroids and normals (k, 3).
+    """
+    selected = np.zeros(len(centroids), bool)
+    for axis, sign, place in zip((0, 0, 1, 1), (-1, 1, -1, 1), box, strict=True):
+        near = np.abs(centroids[:, axis] - place) <= tolerance
+        selected |= near & (sign * normals[:, axis] > 0.9)
+    return selected

@@ -5,6 +5,8 @@ Errors state how many edges, points or triangles are wrong, and where the first 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -44,13 +46,13 @@ def check_manifold(surface: Surface) -> None:
     """Refuse open edges, edges of more than two triangles, inconsistent orientation, and points
     where parts only touch.
     """
-    pairs = _paired_edges(surface)
-    against = pairs[_starts(surface)[pairs[:, 0]] == _starts(surface)[pairs[:, 1]]]
+    pairs, starts = _paired_edges(surface), surface.triangles.ravel()
+    against = pairs[starts[pairs[:, 0]] == starts[pairs[:, 1]]]
     if len(against):
         raise MeshError(
             f"the triangles at {len(against)} edges of the surface are oriented in opposite "
             f"directions, first near {_at(surface, against[0, 0])}; orient them consistently, "
-            "for example with `meshes.repaired`"
+            "for example with `meshes.repair`"
         )
     _check_fans(surface, pairs)
 
@@ -66,7 +68,7 @@ def check_crossings(surface: Surface) -> None:
         )
 
 
-def repaired(
+def repair(
     points: ArrayLike,
     triangles: ArrayLike,
     *,
@@ -96,7 +98,7 @@ def repaired(
 
     >>> from meshes import block, boundary_facets
     >>> box = block((0.02, 0.02, 0.02), 0.02, order=1)
-    >>> surface, notes = repaired(box.points, boundary_facets(box.tets)[:, ::-1])
+    >>> surface, notes = repair(box.points, boundary_facets(box.tets)[:, ::-1])
     >>> notes
     ['reversed 32 of 32 triangles to face outwards']
     """
@@ -139,7 +141,7 @@ def repaired(
         notes.append(f"reversed {inverted.sum():,} of {len(inverted):,} triangles to face outwards")
         order = np.where(inverted[:, None], [[0, 2, 1]], [[0, 1, 2]])
         outwards = np.take_along_axis(surface.triangles, order, axis=1)
-        surface = Surface(points=surface.points, triangles=outwards)
+        surface = replace(surface, triangles=outwards)
     return surface, notes
 
 
@@ -188,13 +190,10 @@ def first_coincident(points: Floats, distance: float | None = None) -> Ints:
     return np.asarray(first[label])
 
 
-def _starts(surface: Surface) -> Ints:
-    """Point (3 k,) at which each side starts. Side 3 t + j is side j of triangle t."""
-    return surface.triangles.ravel()
-
-
 def _edges(triangles: Ints) -> Ints:
-    """Points (3 k, 2) at the ends of each side of triangles (k, 3)."""
+    """Points (3 k, 2) at the ends of each side of triangles (k, 3); side 3 t + j is side j of
+    triangle t.
+    """
     return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
@@ -246,7 +245,7 @@ def _inward_triangles(surface: Surface) -> np.ndarray:
     """Mask (k,) of the triangles to reverse so that every piece faces outwards."""
     pairs, n = _paired_edges(surface), len(surface.triangles)
     t, other = pairs.T // 3
-    starts = _starts(surface)
+    starts = surface.triangles.ravel()
     against = starts[pairs[:, 0]] == starts[pairs[:, 1]]
     # Each triangle is listed twice, as given and reversed. Neighbours that agree are linked.
     links = [np.column_stack([t, other + n * against]),
@@ -270,7 +269,7 @@ def _check_fans(surface: Surface, pairs: Ints) -> None:
     links = np.column_stack([pairs.ravel(), ends[:, ::-1].ravel()])
     label = connected_components(surface.triangles.size, links)
     owner = np.empty(label.max() + 1, np.int64)
-    owner[label] = _starts(surface)
+    owner[label] = surface.triangles.ravel()
     used, count = np.unique(owner, return_counts=True)
     if (pinched := used[count > 1]).size:
         raise MeshError(

@@ -56,14 +56,9 @@ def areas_of(surface: Surface) -> Floats:
     return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
 
-def area(surface: Surface) -> float:
-    """Return the total area in m2."""
-    return float(areas_of(surface).sum())
-
-
 def thinnest(surface: Surface) -> float:
     """Return twice the volume over the area, m: the thickness of a plate."""
-    return 2 * abs(volume(surface)) / area(surface)
+    return 2 * abs(volume(surface)) / float(areas_of(surface).sum())
 
 
 def compact(points: Floats, triangles: Ints) -> Surface:

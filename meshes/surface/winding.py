@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from meshes.surface.repair import check, in_mm
+from meshes.surface.repair import in_mm
 from meshes.surface.self_intersection import self_intersections
 from meshes.surface.triangulation import Surface
 from meshes.tetmesh import MeshError
@@ -47,12 +47,7 @@ def join(surfaces: list[Surface]) -> Surface:
 
 
 def check_inside(outer: Surface, inner: Mapping[str, Surface]) -> None:
-    """Refuse inner surfaces that are open, lie outside the outer one, or cross it or each other."""
-    for name, surface in inner.items():
-        try:
-            check(surface)
-        except MeshError as error:
-            raise MeshError(f"{name}: {error}") from None
+    """Refuse closed inner surfaces that lie outside the outer one, or cross it or each other."""
     surfaces = {"the body": outer, **inner}
     whole = join(list(surfaces.values()))
     owner = np.repeat(np.arange(len(surfaces)), [len(s.triangles) for s in surfaces.values()])

@@ -29,10 +29,6 @@ def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> Te
     mesh : TetMesh of ten-node tetrahedra
     level_set, gradient : functions of points (n, 3) in m that return values (n,) and slopes (n, 3)
 
-    Returns
-    -------
-    TetMesh
-
     Raises a MeshError for four-node elements.
     """
     if mesh.order != 2:
@@ -66,11 +62,9 @@ def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> Te
     return replace(mesh, points=points)
 
 
-def project_to_level_set(
-    points: Floats, level_set: Function, gradient: Function, steps: int = 4
-) -> Floats:
+def project_to_level_set(points: Floats, level_set: Function, gradient: Function) -> Floats:
     """Return points (n, 3) moved onto a nearby level set by Newton steps along its gradient."""
-    for _ in range(steps):
+    for _ in range(4):
         slope = gradient(points)
         steepness = np.maximum(np.einsum("ni,ni->n", slope, slope), 1e-12)
         points = points - (level_set(points) / steepness)[:, None] * slope

@@ -13,13 +13,11 @@ from itertools import permutations, product
 import numpy as np
 
 from meshes.facets import geometry
-from meshes.shapes.structured import check_size, extruded, round_up
+from meshes.shapes.structured import check_cell_count, extrude_plane, round_up
 from meshes.tetmesh import EDGES, MeshError, TetMesh, boundary_facets, quadratic
 from meshes.typing import Floats, Ints
 from meshes.volume.curving import LEAST_RATIO, keep_jacobians
 from meshes.volume.quality import jacobian_ratios
-
-BONE = 1  # region
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,19 +84,11 @@ def quarter_circumference(shape: Fingertip) -> float:
 
 
 def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
-    """Return ten-node tetrahedra of a fingertip, curved at its skin and its bone.
+    """Return ten-node tetrahedra of a fingertip, curved at its skin and its bone, with edges of
+    about h in m at the skin.
 
-    Parameters
-    ----------
-    shape : Fingertip
-    h : float, m, target edge length at the skin
-
-    Returns
-    -------
-    TetMesh with the regions `tissue` (0) and `bone` (1) and the facet sets `top` (faces upwards),
-        `sides` (the cut) and `bottom`
-
-    Raises a MeshError if h is not finite and above 0.
+    Its regions are `tissue` (0) and `bone` (1), its facet sets `top` (faces upwards), `sides` (the
+    cut) and `bottom`. Raises a MeshError if h is not finite and above 0.
     """
     if not 0 < h < np.inf:
         raise MeshError(f"h = {h} m must be finite and above 0")
@@ -106,12 +96,11 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
     fewest_bone_shells = 2
     bone = max(fewest_bone_shells, shells - max(1, round(shape.cover / h)))
     layers = max(1, round_up((shape.length - shape.breadth / 2) / h))
-    check_size((2 * shells, 2 * shells, layers + shells), order=2)
+    check_cell_count((2 * shells, 2 * shells, layers + shells), order=2)
     lattice, tets = _lattice(shells, layers)
     points = _map_lattice(shape, lattice, (bone, shells), layers)
-    tissue = 0
-    region = np.where(_shell_of(lattice)[tets].max(axis=1) <= bone, BONE, tissue)
-    names = {tissue: "tissue", BONE: "bone"}
+    region = (_shell_of(lattice)[tets].max(axis=1) <= bone).astype(int)
+    names = {0: "tissue", 1: "bone"}
     mesh = quadratic(TetMesh(points=points, tets=tets, region=region, region_names=names))
     edges = np.moveaxis(mesh.tets[:, EDGES], 2, 0)
     curved = np.array(mesh.points)
@@ -127,10 +116,9 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
 def _reduce_curvature(mesh: TetMesh, curved: Floats) -> Floats:
     """Curved nodes (n, 3), less so where elements would be distorted, as in a coarse bone."""
     share, change = np.ones((len(curved), 1)), curved - mesh.points
-    easing_steps, easing = 6, 0.7  # reductions of the curvature of distorted elements
-    for _ in range(easing_steps):
+    for _ in range(6):
         bad = jacobian_ratios(mesh.points + share * change, mesh.tets) < LEAST_RATIO
-        share[np.unique(mesh.tets[bad, 4:])] *= easing
+        share[np.unique(mesh.tets[bad, 4:])] *= 0.7
     return keep_jacobians(mesh.tets, mesh.points, mesh.points + share * change)[0]
 
 
@@ -151,7 +139,7 @@ def _lattice(shells: int, layers: int) -> tuple[Floats, Ints]:
     ball = (eighth * signs[:, None, None]).reshape(-1, 4, 3)
     section = _section(ball)
     plane, triangles = np.unique(section.reshape(-1, 2), axis=0, return_inverse=True)
-    rod = extruded(plane, triangles.reshape(-1, 3), np.arange(-layers, 1), order=1)
+    rod = extrude_plane(plane, triangles.reshape(-1, 3), np.arange(-layers, 1), order=1)
     corners = np.vstack([ball, np.round(rod.points[rod.tets][..., [0, 2, 1]]).astype(np.int64)])
     points, tets = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     return points.astype(np.float64), tets.reshape(-1, 4)

@@ -9,13 +9,13 @@ Hall, Int J Numer Methods Eng 7:461, 1973).
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations, permutations
+from itertools import permutations
 
 import numpy as np
 
 from meshes.facets import tag_boundary, visible_from_above
 from meshes.shapes.palm import Palm, gradient, level_set, rise
-from meshes.shapes.structured import check_size
+from meshes.shapes.structured import check_cell_count
 from meshes.tetmesh import MeshError, TetMesh, corner_volumes, quadratic
 from meshes.typing import Bools, Floats, Ints
 from meshes.volume.curving import curve_boundary
@@ -28,7 +28,6 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
 
     Parameters
     ----------
-    palm : Palm
     x, y, z : (n,) float, m, increasing grid lines of the box around the palm without its relief:
         from -breadth/2 to breadth/2, -length/2 to length/2 and -thickness to 0
 
@@ -71,7 +70,7 @@ def kuhn_tets(cells: tuple[int, int, int]) -> Ints:
     Diagonals run outwards from the middle of the grid (Kuhn triangulation of each octant), so that
     no tetrahedron has two boundary facets.
     """
-    check_size(cells)
+    check_cell_count(cells)
     places = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, 3)
     outwards = np.where(places >= np.array(cells) // 2, 1, -1)
     strides = np.array([(cells[1] + 1) * (cells[2] + 1), cells[2] + 1, 1])
@@ -148,14 +147,10 @@ def _on_boundary(cells: tuple[int, ...]) -> Bools:
 
 def _transfinite(values: Floats) -> Floats:
     """Transfinite interpolation of values (i, j, k, ...) from the six sides of a grid."""
-    total = np.zeros_like(values)
-    for count in (1, 2, 3):
-        for axes in combinations(range(3), count):
-            part = values
-            for axis in axes:
-                part = _between_ends(part, axis)
-            total += (-1) ** (count + 1) * part
-    return total
+    rest = values
+    for axis in range(3):
+        rest = rest - _between_ends(rest, axis)
+    return values - rest
 
 
 def _between_ends(values: Floats, axis: int) -> Floats:

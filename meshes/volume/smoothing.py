@@ -16,12 +16,10 @@ from meshes.volume.quality import angles_between_faces, restore_bad
 
 Sizing = Callable[[Floats], Floats]
 
-GOOD = 25.0  # degrees: smallest angles may neither decrease below it, nor fall below it
 
-
-def smooth(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
-    """Return a four-node mesh with moved inner nodes; no smallest angle below 25 degrees gets
-    smaller.
+def smooth(mesh: TetMesh, sizing: Sizing | None = None, *, good: float = 25.0) -> TetMesh:
+    """Return a four-node mesh with moved inner nodes; no smallest angle of an element falls below
+    the angle `good` in degrees, or gets smaller if it is below it.
 
     Nodes on the boundary and between regions stay. `sizing` maps points (n, 3) to target edge
     lengths (n,) in m; None for equal sizes.
@@ -29,12 +27,11 @@ def smooth(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
     points, tets = np.array(mesh.points), mesh.tets
     outer = np.zeros(len(points), bool)
     outer[boundary_facets(tets)] = outer[interface_facets(mesh)] = True
-    steps, share = 12, 0.7  # steps, and the share of the way to the mean in each
-    for _ in range(steps):
+    for _ in range(12):
         moved = _means(points, tets, sizing)
         moved[outer] = points[outer]
-        points = _without_losses(tets, points, points + share * (moved - points))
-    for node in np.unique(tets[_least_angles(points, tets) < GOOD]):
+        points = _without_losses(tets, points, points + 0.7 * (moved - points), good)
+    for node in np.unique(tets[_least_angles(points, tets) < good]):
         if not outer[node]:
             _widen(points, tets[(tets == node).any(axis=1)], node)
     return replace(mesh, points=points)
@@ -73,9 +70,9 @@ def _means(points: Floats, tets: Ints, sizing: Sizing | None) -> Floats:
     return np.column_stack(sums) / total[:, None]
 
 
-def _without_losses(tets: Ints, points: Floats, moved: Floats) -> Floats:
+def _without_losses(tets: Ints, points: Floats, moved: Floats, good: float) -> Floats:
     """Moved nodes, restored at elements whose angles get worse."""
-    floor = np.minimum(_least_angles(points, tets), GOOD)
+    floor = np.minimum(_least_angles(points, tets), good)
 
     def gets_worse(at: Floats) -> np.ndarray:
         return np.asarray((_least_angles(at, tets) < floor) | (corner_volumes(at, tets) <= 0))

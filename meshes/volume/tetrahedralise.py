@@ -8,7 +8,7 @@ separate process with a time limit, and results are cached on disk.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from importlib.util import find_spec
 from types import MappingProxyType
@@ -18,8 +18,8 @@ import numpy as np
 from meshes import cache, subprocess_call
 from meshes.facets import tag_boundary
 from meshes.shapes.structured import Grading, extrude
-from meshes.surface.repair import check, repaired
-from meshes.surface.triangulation import Surface, area, n_pieces, thinnest, volume
+from meshes.surface.repair import check, repair
+from meshes.surface.triangulation import Surface, areas_of, n_pieces, thinnest, volume
 from meshes.surface.winding import join, winding_number
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
 from meshes.typing import Floats
@@ -29,7 +29,6 @@ from meshes.volume.smoothing import Sizing, smooth
 log = logging.getLogger(__name__)
 
 EPSILON = 0.05  # of h: largest distance of the mesh from the surface, its envelope
-SMALLEST_EPSILON = 1e-4  # of the diagonal: below it, the mesher takes minutes to hours
 SHARPEST = 5.0  # degrees: least acceptable dihedral angle
 REST = "tissue"  # name of the region outside inner surfaces
 
@@ -46,7 +45,6 @@ def tetrahedralise(
 
     Parameters
     ----------
-    surface : Surface
     h : float, m, target edge length
     inner : region name -> closed surface inside the outer one, or cut off with it at one plane
     sizing : function of points (n, 3) that returns target edge lengths (n,) in m; None for h
@@ -62,38 +60,30 @@ def tetrahedralise(
     fails, takes too long or returns a bad mesh.
     """
     check(surface)
-    check_size(surface, "h", h)
-    epsilon = _envelope(surface, h)
-    most_of_inner = 0.025  # of the thickness of an inner surface, whose volume may change by 2 %
-    if inner:
-        epsilon = max(
-            min(epsilon, *(most_of_inner * thinnest(s) for s in inner.values())),
-            SMALLEST_EPSILON * surface.diagonal,
-        )
+    check_edge_length(surface, "h", h)
+    epsilon = _envelope(surface, h, inner.values())
     if not 0 < timeout < np.inf:
         raise MeshError(f"timeout = {timeout} s must be finite and above 0")
     grid = _size_grid(surface, h, sizing)
     whole = join([surface, *inner.values()])
     inputs = {
-        "points": whole.points,
-        "triangles": whole.triangles,
+        "points": whole.points, "triangles": whole.triangles,
         "h": grid["grid_sizes"].max(),  # sizes above it are not reached
-        "epsilon": np.array(epsilon / surface.diagonal),
-        **grid,
-    }
+        "epsilon": np.array(epsilon / surface.diagonal), **grid,
+    }  # fmt: skip
     name = cache.key("tetrahedralise 3", *(inputs[part] for part in sorted(inputs)))
     entry = cache.load(name) or {}
-    if {"points", "tets"} <= entry.keys():
-        return _with_regions(
-            _checked_result(surface, epsilon, entry["points"], entry["tets"]), inner
-        )
-    result = _checked_result(surface, epsilon, *_run(inputs, timeout))
-    mesh = smooth(_with_regions(result, inner), sizing)
-    cache.store(name, {}, points=mesh.points, tets=mesh.tets)
+    is_cached = {"points", "tets"} <= entry.keys()
+    raw = (entry["points"], entry["tets"]) if is_cached else _run(inputs, timeout)
+    mesh = _with_regions(_checked_result(surface, epsilon, *raw), inner)
+    if is_cached:
+        return mesh
+    mesh = smooth(mesh, sizing)
+    cache.store(name, {}, {"points": mesh.points, "tets": mesh.tets})
     return mesh
 
 
-def graded(h: float, grading: Grading) -> Sizing:
+def graded_sizing(h: float, grading: Grading) -> Sizing:
     """Return a sizing function: h within `grading.radius` of the origin, growing to `coarsest`."""
     slope = float(np.log(grading.growth))
 
@@ -104,21 +94,23 @@ def graded(h: float, grading: Grading) -> Sizing:
     return sizes
 
 
-def _envelope(surface: Surface, h: float) -> float:
-    """Largest distance in m of a mesh from a surface; smaller ones take longer if it is curved."""
+def _envelope(surface: Surface, h: float, inner: Collection[Surface]) -> float:
+    """Largest distance in m of a mesh from its surfaces; smaller ones take longer if curved."""
     thickness, diagonal = thinnest(surface), surface.diagonal
-    most_of_thickness = 0.1  # of the thickness of the body, which a larger envelope would swallow
-    most, least = most_of_thickness * thickness, SMALLEST_EPSILON * diagonal
+    of_thickness = 0.1  # of the body, which a larger envelope would swallow
+    of_inner = 0.025  # of the thickness of an inner surface, whose volume may change by 2 %
+    of_diagonal = 1e-4  # below it, the mesher takes minutes to hours
+    most, least = of_thickness * thickness, of_diagonal * diagonal
     if most < least:
         raise MeshError(
             f"the body is {1e3 * thickness:.3g} mm thick and {1e3 * diagonal:.3g} mm long, too "
-            f"thin for the mesher, whose limit is 1:{most_of_thickness / SMALLEST_EPSILON:g}; "
-            "use `meshes.sheet` or `meshes.block`"
+            f"thin for the mesher, whose limit is 1:{of_thickness / of_diagonal:g}; use "
+            "`meshes.sheet` or `meshes.block`"
         )
-    return min(max(EPSILON * h, least), most)
+    return max(min([EPSILON * h, most, *(of_inner * thinnest(each) for each in inner)]), least)
 
 
-def check_size(surface: Surface, name: str, length: float) -> None:
+def check_edge_length(surface: Surface, name: str, length: float) -> None:
     """Refuse a length in m that exceeds the body, or is less than a thousandth of it."""
     longest = float(np.ptp(surface.points, axis=0).max())
     if not 1e-3 * longest <= length <= longest:
@@ -141,7 +133,7 @@ def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, n
             raise MeshError(
                 f"sizing returned shape {sizes.shape}; return one finite length per point"
             )
-        check_size(surface, "least size", float(sizes.min()))
+        check_edge_length(surface, "least size", float(sizes.min()))
         sizes = np.minimum(sizes, (high - low).max())
     expected = (corner_volumes(grid.points, grid.tets) / sizes[grid.tets].mean(axis=1) ** 3).sum()
     expected *= 8.5 * volume(surface) / np.prod(high - low + 2 * pad)
@@ -218,7 +210,7 @@ def _checked_result(surface: Surface, epsilon: float, points: Floats, tets: np.n
     used, numbers = np.unique(tets, return_inverse=True)
     mesh = tag_boundary(TetMesh(points=points[used], tets=numbers.reshape(-1, 4)))
     boundary = boundary_facets(mesh.tets)
-    outside, _ = repaired(mesh.points, boundary)  # refuses open and crowded edges
+    outside, _ = repair(mesh.points, boundary)  # refuses open and crowded edges
     if (n := n_pieces(outside)) != 1 or len(outside.triangles) != len(boundary):
         raise MeshError(
             f"the boundary of the mesh has {n} pieces instead of one; smooth the surface"
@@ -227,7 +219,7 @@ def _checked_result(surface: Surface, epsilon: float, points: Floats, tets: np.n
     ratio = corner_volumes(mesh.points, mesh.tets).sum() / enclosed
     volume_error = 0.005  # relative to the volume within the surface
     lost_shell = 0.3  # of the volume between surface and envelope that straight facets may cut off
-    limit = volume_error + lost_shell * epsilon * area(surface) / enclosed
+    limit = volume_error + lost_shell * epsilon * areas_of(surface).sum() / enclosed
     if not abs(ratio - 1) <= limit:
         raise MeshError(
             f"the mesh has {100 * ratio:.2f} % of the volume within the surface, a difference "

@@ -306,7 +306,7 @@ def sheet_curves(
     mu, slope = (x[:, 0] for x in modulus_and_slope(sheet, omega))
     bending = thickness**3 / (6 * (1 - material.poisson)) * mu
     mass, air = material.density * thickness, 2 * air_density
-    k = _bending_wavenumbers(bending, tension, mass * omega**2, air * omega**2)
+    k = bending_wavenumbers(bending, tension, mass * omega**2, air * omega**2)
     D, w = bending[:, None], omega[:, None]
     by_k = 5 * D * k**4 + 3 * tension * k**2 - mass * w**2
     by_frequency = (slope / mu)[:, None] * D * k**5 - 2 * w * (mass * k + air)
@@ -320,8 +320,10 @@ def sheet_curves(
     return curves(f, np.array([0.0, thickness]), roots, ("bending wave", "bending near field"))
 
 
-def _bending_wavenumbers(bending: Complex, tension: float, inertia: Floats, air: Floats) -> Complex:
-    """Propagating and evanescent roots (f, 2) of D k^5 + T k^3 - a k - b, by Newton's method."""
+def bending_wavenumbers(bending: Complex, tension: float, inertia: Floats, air: Floats) -> Complex:
+    """Return the propagating and evanescent roots (f, 2) of D k^5 + T k^3 - a k - b, by Newton's
+    method, for stiffnesses D and inertias of the sheet a and of the air b, each (f,).
+    """
     D, a, b = bending[:, None], inertia[:, None], air[:, None]
     half = tension / 2 / D
     mean = np.sqrt(half**2 + a / D + 0j)

@@ -3,6 +3,8 @@
 from functools import lru_cache
 from math import inf, isfinite
 
+import numpy as np
+
 from simple_model import Stack
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.dispersion import DispersionCurves, dispersion_curves
@@ -54,13 +56,10 @@ def flat_layers(body: Body) -> Stack:
     """Return the layers of a body as if it were flat and everywhere as deep as in its middle."""
     starts, materials = zip(*body.strata, strict=True)
     end = inf if body.base == "absorbing" else body.depth
-    thicknesses = [below - top for top, below in zip(starts, (*starts[1:], end), strict=True)]
     return Stack(
-        materials=materials,
-        thicknesses=tuple(thicknesses),
-        base=body.base if body.base in BASES else BASES[0],
-        base_stiffness=body.base_stiffness,
-    )
+        materials=materials, thicknesses=tuple(np.diff([*starts, end]).tolist()),
+        base=body.base if body.base in BASES else BASES[0], base_stiffness=body.base_stiffness,
+    )  # fmt: skip
 
 
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:

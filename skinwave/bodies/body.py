@@ -391,7 +391,7 @@ def _no_wave(body: Body, frequency: float) -> float:
     raise ValueError("body kind 'none' has no waves; choose a sheet or a slab")
 
 
-NONE = register(  # what the point kernel acts on
+register(  # what the point kernel acts on
     BodyKind(
         name="none",
         presets={"none": {}},

@@ -14,7 +14,7 @@ from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import check_element_size, default_size
-from skinwave.bodies.supports import combine, winkler_foundation
+from skinwave.bodies.supports import with_springs
 from skinwave.typing import Bools, Floats, Ints
 
 COMPARED = 4 / 3  # of the coarsest element size: limit of meshes that estimate errors
@@ -73,14 +73,10 @@ def build(
     for axis in symmetry:
         mesh = half(mesh, axis)
         fixed[f"mirror_{axis}"] = axis
-    drag = made.drag(mesh) if made.drag else None
-    support = made.support(mesh) if made.support else None
+    drag, support = made.drag and made.drag(mesh), made.support and made.support(mesh)
+    held, stiffener = made.held and made.held(mesh), made.stiffener and made.stiffener(mesh)
     if ends.get("bottom") == "elastic":
-        support = combine(
-            support, winkler_foundation(mesh, mesh.facets["bottom"], body.base_stiffness)
-        )
-    held = made.held(mesh) if made.held else None
-    stiffener = made.stiffener(mesh) if made.stiffener else None
+        support = with_springs(support, mesh, mesh.facets["bottom"], body.base_stiffness)
     is_fixed = "xyz" in fixed.values() or held is not None
     if body.is_held and not is_fixed and not (support and support.stiffness.any()):
         raise ValueError(
@@ -90,32 +86,17 @@ def build(
     mesh = replace(mesh, points=body.placement(mesh.points))
     leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
     return Build(
-        mesh=mesh,
-        material=dict(enumerate(made.materials)),
-        fixed=fixed,
-        absorbing=np.vstack(leaky) if leaky else None,
-        coat=made.coat,
-        drag=drag,
-        support=support,
-        symmetry=symmetry,
-        held=held,
-        tension=made.tension,
-        stiffener=stiffener,
+        mesh=mesh, material=dict(enumerate(made.materials)), fixed=fixed, held=held,
+        absorbing=np.vstack(leaky) if leaky else None, drag=drag, support=support,
+        coat=made.coat, tension=made.tension, stiffener=stiffener, symmetry=symmetry,
         axes=body.placement.rotation.T[:2],
-    )
+    )  # fmt: skip
 
 
 def operators(build: Build) -> Operators:
     """Return the stiffness, damping and mass of a meshed body."""
     return assemble(
-        build.mesh,
-        build.material,
-        fixed=build.constraints,
-        absorbing=build.absorbing,
-        drag=build.drag,
-        support=build.support,
-        coat=build.coat,
-        tension=build.tension,
-        stiffener=build.stiffener,
-        axes=build.axes,
-    )
+        build.mesh, build.material, fixed=build.constraints, absorbing=build.absorbing,
+        drag=build.drag, support=build.support, coat=build.coat, tension=build.tension,
+        stiffener=build.stiffener, axes=build.axes,
+    )  # fmt: skip

@@ -8,16 +8,15 @@ import numpy as np
 
 from meshes import TetMesh
 from meshes.facets import heights_over
+from meshes.tetmesh import FACES
 from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.parts import FLAT, Layer
 from skinwave.typing import Floats, Ints
 
-THINNEST = 1e-6  # m: shorter pieces of a vertical line are round-off
 
-
-def flattened(body: Body, places: Floats, h: float, rigid: float = 100.0) -> Body:
+def flatten(body: Body, places: Floats, h: float, rigid: float = 100.0) -> Body:
     """Return a flat body without reflecting sides, with the strata of a body under the focus.
 
     Solids become a slab with absorbing sides. Palms and discs are everywhere as deep as in their
@@ -48,15 +47,19 @@ def flattened(body: Body, places: Floats, h: float, rigid: float = 100.0) -> Bod
 
 
 @lru_cache(maxsize=8)
-def meshed(body: Body, h: float) -> Build:
+def build_without_layers(body: Body, h: float) -> Build:
     """Return a body meshed without its layers, with elements of h in m."""
     return build(replace(body, layers=()), h)
 
 
-def _column(body: Body, place: Floats, h: float) -> list[tuple[float, Material]]:
-    """Thickness in m and material of each stratum below a place (2,) in m, down to a gap."""
-    built = meshed(body, h)
-    upper, lower, region = _crossed(built.mesh, place)
+def _column(
+    body: Body, place: Floats, h: float, thinnest: float = 1e-6
+) -> list[tuple[float, Material]]:
+    """Thickness in m and material of each stratum below a place (2,) in m, down to a gap. Pieces of
+    the vertical line shorter than `thinnest` in m are round-off.
+    """
+    built = build_without_layers(body, h)
+    upper, lower, region = _crossed(built.mesh, place, thinnest)
     if not len(upper):
         x, y = 1e3 * place
         raise ValueError(
@@ -67,13 +70,13 @@ def _column(body: Body, place: Floats, h: float) -> list[tuple[float, Material]]
     end = 0.0
     tops, bottoms = (upper[0] - upper).tolist(), (upper[0] - lower).tolist()
     for top, bottom, number in zip(tops, bottoms, region.tolist(), strict=True):
-        if top > end + THINNEST:
+        if top > end + thinnest:
             break
         strata = body.strata if number == 0 else ((0.0, built.material[number]),)
         starts = [start for start, _ in strata]
         for (start, solid), below in zip(strata, [*starts[1:], inf], strict=True):
             thickness = min(bottom, below) - max(end, start)
-            if thickness > THINNEST:
+            if thickness > thinnest:
                 if pieces and pieces[-1][1] == solid:
                     thickness += pieces.pop()[0]
                 pieces.append((thickness, solid))
@@ -81,13 +84,12 @@ def _column(body: Body, place: Floats, h: float) -> list[tuple[float, Material]]
     return pieces
 
 
-def _crossed(mesh: TetMesh, place: Floats) -> tuple[Floats, Floats, Ints]:
+def _crossed(mesh: TetMesh, place: Floats, thinnest: float) -> tuple[Floats, Floats, Ints]:
     """Heights in m at which a vertical line enters and leaves tetrahedra, and their regions, from
     the top downwards."""
-    opposite = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
-    faces = mesh.points[mesh.tets[:, opposite]].reshape(-1, 3, 3)
+    faces = mesh.points[mesh.tets[:, FACES[:, :3]]].reshape(-1, 3, 3)
     heights = heights_over(faces, place).reshape(-1, 4)
     upper, lower = heights.max(axis=1), np.where(heights > -inf, heights, inf).min(axis=1)
-    crossed = np.flatnonzero(upper - lower > THINNEST)
+    crossed = np.flatnonzero(upper - lower > thinnest)
     crossed = crossed[np.argsort(-upper[crossed], kind="stable")]
     return upper[crossed], lower[crossed], mesh.region[crossed]

@@ -7,10 +7,10 @@ import numpy as np
 
 from meshes import TetMesh, body_from_file, boundary_facets, quadratic
 from meshes.facets import visible_from_above
+from meshes.tetmesh import facet_keys
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.tissue import hand_size, in_tissue_layers
-from skinwave.typing import Ints
 
 
 def discretise(body: Body, h: float) -> Discretised:
@@ -31,13 +31,11 @@ def discretise(body: Body, h: float) -> Discretised:
 def _is_remainder(mesh: TetMesh) -> bool:
     """Whether `bottom` is all of the boundary that is not visible from above, except the cut."""
     hidden = boundary_facets(mesh.tets)[~visible_from_above(mesh)]
-    cut = _corners(mesh.facets["cut"]) if "cut" in mesh.facets else set()
-    return _corners(mesh.facets["bottom"]) | cut == _corners(hidden) | cut
-
-
-def _corners(facets: Ints) -> set[tuple[int, ...]]:
-    """The corners of each facet in ascending order."""
-    return set(map(tuple, np.sort(facets[:, :3], axis=1).tolist()))
+    bottom, cut, rest = (
+        set(facet_keys(facets, len(mesh.points)).tolist())
+        for facets in (mesh.facets["bottom"], mesh.facets.get("cut", hidden[:0]), hidden)
+    )
+    return bottom | cut == rest | cut
 
 
 register(

@@ -10,15 +10,11 @@ from fem.load_and_probe import facet_points
 from meshes import Grading, TetMesh, boundary_facets, graded_axis, mapped_palm
 from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
-from meshes.shapes.structured import Lines, check_size, mirror_line
+from meshes.shapes.structured import Lines, check_cell_count, mirror_line
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.tissue import HAND_CELL, hand_size, in_tissue_layers, support
-
-# Elements at the surface over h, because motion there has the scale of the focal spot; and their
-# height over their width, at which error and cost balance best.
-SURFACE, FLAT = 0.8, 0.8
 
 
 def discretise(body: Body, h: float) -> Discretised:
@@ -31,29 +27,24 @@ def discretise(body: Body, h: float) -> Discretised:
     return in_tissue_layers(body, h, mesh, partial(_support, body))
 
 
-def _coarsest(body: Body, h: float) -> float:
-    """Largest element size in m; larger elements do not follow the rim, where waves reflect."""
-    coarsest = 2.0  # largest elements far from the middle, over h
-    rim = 0.7  # largest elements at the rim, over the radius of the edge
-    return max(SURFACE * h, min(coarsest * h, rim * body.palm.edge_radius))
-
-
 def grid_lines(body: Body, h: float) -> Lines:
     """Return grid lines in m of the box around a palm, with cells that grow from its middle."""
     # Sides of boxes over the edges of their elements. Below the default size they grow by its third
     # root: rows of boxes are fine from side to side, and 2 mm would need 560,000 dofs where 230,000
     # are within 0.3 %.
-    cell = 0.85
-    side = cell * max(1.0, HAND_CELL / h) ** (1 / 3)
-    finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
-    fine_radius, downwards = 25e-3, 0.6  # m of elements of h; power of growth downwards
-    along = Grading(radius=fine_radius, growth=GROWTH, coarsest=coarsest)
+    side = 0.85 * max(1.0, HAND_CELL / h) ** (1 / 3)
+    surface = 0.8 * h  # motion at the surface has the scale of the focal spot
+    # Larger elements do not follow the rim, where waves reflect.
+    largest = max(surface, min(2 * h, 0.7 * body.palm.edge_radius))
+    finest, coarsest = side * surface, side * largest
+    along = Grading(radius=25e-3, growth=GROWTH, coarsest=coarsest)
     x, y = (mirror_line(graded_axis(side / 2, finest, along)) for side in (body.width, body.height))
     # No cell is higher than its target size. Two meshes that are compared then differ more often in
-    # their number of layers, which affects the error most.
-    heights = [FLAT * finest]
+    # their number of layers, which affects the error most. Error and cost balance best if the first
+    # cell is 0.8 times as high as wide.
+    heights = [0.8 * finest]
     while (below := sum(heights)) < body.depth:
-        heights.append(min(heights[-1] * GROWTH**downwards, coarsest))
+        heights.append(min(heights[-1] * GROWTH**0.6, coarsest))
     return x, y, -np.append(0.0, np.cumsum(heights))[::-1] * (body.depth / below)
 
 
@@ -71,7 +62,7 @@ register(
         keys=("relief",),
         presets={"palm": {"width": 0.085}},  # of the effective homogeneous soft tissue of a palm
         check=lambda body: body.palm,
-        check_size=lambda body, h: check_size(len(line) - 1 for line in grid_lines(body, h)),
+        check_size=lambda body, h: check_cell_count(len(line) - 1 for line in grid_lines(body, h)),
         discretise=discretise,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=8e-3,

@@ -16,10 +16,7 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import Strata
 from skinwave.bodies.parts import solid_of
 
-THINNEST = 0.5  # of an element that does not follow layers: the thinnest layer that it resolves
-
-
-AT = 400.0  # Hz, the highest lines of Tactons
+COAT_FREQUENCY = 400.0  # Hz, the highest lines of Tactons
 
 
 def check_mesh(body: Body, h: float) -> None:
@@ -79,7 +76,7 @@ def _check_layers(body: Body, h: float, slack: float) -> None:
     too_thick = " and too thick for a coat" if body.of_kind.may_be_coated else ""
     smaller = "" if is_hopeless else f"elements of {1e3 * coarsest:g} mm, "
     raise ValueError(
-        f"a layer of {1e3 * THINNEST * coarsest:g} mm of a {body.kind} is thinner than half an "
+        f"a layer of {1e3 * coarsest / 2:g} mm of a {body.kind} is thinner than half an "
         f"element of {1e3 * size:g} mm{too_thick}; use {smaller}thicker layers, or a slab, whose "
         "elements follow its layers"
     )
@@ -101,13 +98,15 @@ def thicknesses(strata: Strata) -> list[float]:
     return np.diff([*starts, inf]).tolist()
 
 
-def largest_coat(body: Body) -> int:
-    """Return the largest number of strata that may be the coat of a body."""
+def largest_coat(body: Body, thickest: float = 0.1) -> int:
+    """Return the largest number of strata that may be the coat of a body, up to `thickest` shear
+    wavelengths.
+    """
     strata = body.strata
     slowest = np.minimum.accumulate([solid.shear_speed for _, solid in strata])
     counts = range(1, len(strata) if body.of_kind.may_be_coated else 1)
-    thickest = 0.1  # coat over a shear wavelength
-    return max((k for k in counts if strata[k][0] <= thickest * slowest[k] / AT), default=0)
+    limits = thickest * slowest / COAT_FREQUENCY
+    return max((k for k in counts if strata[k][0] <= limits[k]), default=0)
 
 
 def without_coat(strata: Strata, count: int) -> Strata:
@@ -116,8 +115,10 @@ def without_coat(strata: Strata, count: int) -> Strata:
 
 
 def resolving_size(strata: Strata) -> float:
-    """Return the coarsest size in m of elements that resolve layers without conforming to them."""
-    return min(thicknesses(strata)) / THINNEST
+    """Return the coarsest size in m of elements that resolve layers without conforming to them: an
+    element resolves layers of at least half its size.
+    """
+    return 2 * min(thicknesses(strata))
 
 
 def coarsest_size(body: Body) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 
 from meshes import Grading, extrude, graded_axis
 from meshes.files.import_body import FINE_RADIUS
-from meshes.shapes.structured import Lines, check_size, mirror_line, with_planes
+from meshes.shapes.structured import Lines, check_cell_count, mirror_line, with_planes
 from simple_model.layers.compliance import layered
 from skinwave.bodies.absorbing_layer import far_springs, has_layer, layer_drag, layer_line, layer_of
 from skinwave.bodies.analytic import stack, stack_dispersion
@@ -16,10 +16,7 @@ from skinwave.bodies.parts import Layer
 from skinwave.bodies.supports import EDGES
 from skinwave.typing import Floats
 
-SLAB_CELL = 3e-3  # m: two thirds of the focal spot's standard deviation
-THIN_CELL = SLAB_CELL / 2  # of bodies that are thinner than two of them
-# Size ratio of neighbouring cells along the surface and downwards; coarsest cell over finest.
-GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
+THIN_CELL = 1.5e-3  # m, of bodies that are thinner than two of them
 
 
 def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
@@ -50,7 +47,7 @@ def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
 
 def grid_lines(body: Body, h: float) -> Lines:
     """Return grid lines along x, y and z through a body, fine where the focus travels."""
-    along = Grading(radius=FINE_RADIUS, growth=GROWTH[0], coarsest=COARSEST[0] * h)
+    along = Grading(radius=FINE_RADIUS, growth=1.4, coarsest=3 * h)
     x, y = (mirror_line(graded_axis(side / 2, h, along)) for side in (body.width, body.height))
     return x, y, -_depth_line(body, h)[::-1]
 
@@ -85,7 +82,7 @@ def _depth_line(body: Body, h: float) -> Floats:
     """Grid lines of a slab from its top downwards."""
     if body.depth < 2 * THIN_CELL:  # it may bend, which one layer shows less well
         h = min(h, body.depth / 2)
-    down = Grading(radius=0.0, growth=GROWTH[1], coarsest=COARSEST[1] * h)
+    down = Grading(radius=0.0, growth=1.25, coarsest=2 * h)
     return with_planes(graded_axis(body.depth, h, down), [start for start, _ in body.strata[1:]])
 
 
@@ -94,39 +91,44 @@ def cell_layers(body: Body, h: float) -> int:
     return len(_depth_line(body, h)) - 1
 
 
-# Layered skin on bone, fitted to published waves; bench/layered_skin.py has the range of each
-# number. Epidermis of a palm 265 +- 51 um (optical coherence tomography, PMC11137746), all skin
-# 0.8 to 1.4 mm, hypodermis 2 to 6 mm. The depth of the bone is an assumption within 10 to 25 mm.
-PALM_LAYERS = (
-    Layer(thickness=0.27e-3, material="epidermis"),
-    Layer(thickness=1.0e-3, material="dermis"),
-    Layer(thickness=2.0e-3, material="fat"),
-)
-# Epidermis with stratum corneum of a forearm 75 +- 13 um (Sandby-Moller et al., Acta Derm Venereol
-# 83:410 (2003)). Dermis (1 to 1.5 mm), hypodermis (2 to 10 mm) and muscle (10 to 20 mm) vary
-# between people and are assumptions.
-FOREARM_LAYERS = (
-    Layer(thickness=0.075e-3, material="forearm-epidermis"),
-    Layer(thickness=1.2e-3, material="forearm-dermis"),
-    Layer(thickness=4.0e-3, material="forearm-hypodermis"),
-)
-
 register(
     BodyKind(
         name="slab",
         presets={
             "skin-slab": {},  # effective homogeneous soft tissue of the palm on bone
-            "palm-layers": {"material": "muscle", "layers": PALM_LAYERS, "depth": 0.025},
+            # Layered skin on bone, fitted to published waves; bench/layered_skin.py has the range
+            # of each number. Epidermis of a palm 265 +- 51 um (optical coherence tomography,
+            # PMC11137746), all skin 0.8 to 1.4 mm, hypodermis 2 to 6 mm. The depth of the bone is
+            # an assumption within 10 to 25 mm.
+            "palm-layers": {
+                "depth": 0.025,
+                "material": "muscle",
+                "layers": (
+                    Layer(thickness=0.27e-3, material="epidermis"),
+                    Layer(thickness=1.0e-3, material="dermis"),
+                    Layer(thickness=2.0e-3, material="fat"),
+                ),
+            },
+            # Epidermis with stratum corneum of a forearm 75 +- 13 um (Sandby-Moller et al., Acta
+            # Derm Venereol 83:410 (2003)). Dermis (1 to 1.5 mm), hypodermis (2 to 10 mm) and muscle
+            # (10 to 20 mm) vary between people and are assumptions.
             "forearm-layers": {
-                "material": "forearm-muscle",
-                "layers": FOREARM_LAYERS,
                 "depth": 0.020,
+                "material": "forearm-muscle",
+                "layers": (
+                    Layer(thickness=0.075e-3, material="forearm-epidermis"),
+                    Layer(thickness=1.2e-3, material="forearm-dermis"),
+                    Layer(thickness=4.0e-3, material="forearm-hypodermis"),
+                ),
             },
         },
         discretise=discretise,
         morph=morph,
-        check_size=lambda body, h: check_size(len(line) - 1 for line in slab_grid_lines(body, h)),
-        default_size=lambda body: min(SLAB_CELL, max(body.depth / 2, THIN_CELL)),
+        check_size=lambda body, h: check_cell_count(
+            len(line) - 1 for line in slab_grid_lines(body, h)
+        ),
+        # At most two thirds of the standard deviation of the focal spot.
+        default_size=lambda body: min(3e-3, max(body.depth / 2, THIN_CELL)),
         compliance=lambda body: layered(stack(body)),
         dispersion=stack_dispersion,
         named_sides=tuple(EDGES),

@@ -1,7 +1,7 @@
 """Supports of a body: its sides, the elastic bed below it, and the mounting of a sheet."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from simple_model.choices import check_numbers, check_range, choose
 from skinwave.typing import Bools, Ints
 
 EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # axis, end
-NEARLY = 0.01  # of the radius of a clip: lines nearer than this to another are left out
 CONDITIONS = ("clamped", "absorbing", "free")  # of a side
 DEFAULT_SIDE = "absorbing"
 
@@ -40,8 +39,7 @@ class Sides:
     @property
     def by_name(self) -> dict[str, str]:
         """Conditions by the names of sides."""
-        each = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: condition for name, condition in each.items() if condition}
+        return {name: condition for name, condition in vars(self).items() if condition}
 
     @property
     def symmetry(self) -> str:
@@ -89,21 +87,14 @@ def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> 
         )
 
 
-def winkler_foundation(mesh: TetMesh, facets: Ints, stiffness: float) -> Support:
-    """Return springs in all directions with a stiffness in N/m3."""
+def with_springs(support: Support | None, mesh: TetMesh, facets: Ints, stiffness: float) -> Support:
+    """Return a support with further springs in all directions, of a stiffness in N/m3."""
     k = np.full(len(facet_points(mesh, facets)), stiffness)
-    return Support(facets=facets, stiffness=k, absorbed=np.zeros_like(k))
-
-
-def combine(first: Support | None, second: Support) -> Support:
-    """Return both supports of a mesh as one."""
-    if first is None:
-        return second
-    return Support(
-        facets=np.vstack([first.facets, second.facets]),
-        stiffness=np.concatenate([first.stiffness, second.stiffness]),
-        absorbed=np.concatenate([first.absorbed, second.absorbed]),
-    )
+    springs = Support(facets=facets, stiffness=k, absorbed=np.zeros_like(k))
+    if support is None:
+        return springs
+    pairs = {name: (own, vars(springs)[name]) for name, own in vars(support).items()}
+    return Support(**{name: np.concatenate(pair) for name, pair in pairs.items()})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,7 +168,7 @@ class Mounting:
     @property
     def symmetry(self) -> str:
         """Axes, out of "xy", across whose middle planes the supports are mirror images."""
-        return "".join(name for name, axis in (("x", 0), ("y", 1)) if self._is_mirrored(axis))
+        return "".join(name for axis, name in enumerate("xy") if self._is_mirrored(axis))
 
     def _is_mirrored(self, axis: int) -> bool:
         ends = [edge for edge in self.edges if EDGES[edge][0] == axis]
@@ -237,9 +228,8 @@ def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
     reach = mounting.clip_radius
     sides = [clip[axis] + turn * reach for clip in mounting.clips for turn in (-1, 1) if reach]
     placed: list[float] = []
-    relative_lines = (0.1, 0.25, 0.5)  # of the radius of a clip
-    for part in (0.0, *relative_lines):
-        gap = (part / 2 or NEARLY) * reach
+    for part in (0.0, 0.1, 0.25, 0.5):  # distance from the sides, over the radius of a clip
+        gap = (part / 2 or 0.01) * reach  # to other lines
         lines = {side + turn * part * reach for side in sides for turn in (-1, 1)}
         placed += [
             at for at in sorted(lines, key=abs)
@@ -263,7 +253,7 @@ def supported_components(mounting: Mounting, mesh: TetMesh) -> Bools:
     high[:2] = np.maximum(high[:2], -low[:2])
     near = 1e-9 * float(np.ptp(points, axis=0).max())
     middle = np.abs(2 * points[:, 2] - low[2] - high[2]) < near
-    held = np.zeros(points.shape, bool)
+    held, clamped = np.zeros(points.shape, bool), np.zeros(len(points), bool)
     for edge in mounting.edges:
         axis, end = EDGES[edge]
         at = np.abs(points[:, axis] - end * high[axis]) < near
@@ -271,13 +261,12 @@ def supported_components(mounting: Mounting, mesh: TetMesh) -> Bools:
             held[at, 2] = held[at, 1 - axis] = True
             held[at & middle] = True
         else:
-            held[at, :2] = True
-            held[at & middle, 2] = True
+            clamped |= at
     for clip in mounting.clips:
         there = [abs(c) if low[axis] > -near else c for axis, c in enumerate(clip)]
-        at = _clip_nodes(mesh, there, mounting.clip_radius)
-        held[at, :2] = True
-        held[at & middle, 2] = True
+        clamped |= _clip_nodes(mesh, there, mounting.clip_radius)
+    held[clamped, :2] = True
+    held[clamped & middle, 2] = True
     return held
 
 
@@ -288,4 +277,4 @@ def _clip_nodes(mesh: TetMesh, clip: Sequence[float], radius: float, fewest: int
     away = np.abs(mesh.points[:, :2] - clip).max(axis=1)
     top = np.unique(mesh.facets["top"])
     reach = np.partition(away[top], fewest - 1)[fewest - 1]
-    return away <= max(radius, reach) * (1 + NEARLY)
+    return away <= 1.01 * max(radius, reach)

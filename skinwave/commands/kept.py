@@ -99,7 +99,7 @@ def _keep(name: str, options: argparse.Namespace) -> None:
         path.relative_to(options.out).as_posix(): np.frombuffer(content, np.uint8)
         for path, content in files.items()
     }
-    cache.store(name, meta, **arrays)
+    cache.store(name, meta, arrays)
 
 
 def _recall(options: argparse.Namespace, meta: dict[str, Any], files: dict[str, Any]) -> int:

@@ -56,5 +56,5 @@ def pack_of(body: Body, progress: Progress = silent) -> dict[str, Any]:
         stored: dict[str, Any] = json.loads(entry["pack"].tobytes())
         return stored
     pack = element_pack(body, size, progress)
-    cache.store(key, {}, pack=np.frombuffer(json.dumps(pack).encode(), np.uint8))
+    cache.store(key, {}, {"pack": np.frombuffer(json.dumps(pack).encode(), np.uint8)})
     return pack

@@ -173,7 +173,7 @@ def cached_record(name: str) -> Any:
 def store_record(name: str, record: object) -> None:
     """Cache a record under a name, if all numbers of its arrays are finite."""
     arrays: dict[str, np.ndarray] = {}
-    cache.store(name, encode(record, arrays), **arrays)
+    cache.store(name, encode(record, arrays), arrays)
 
 
 def cache_key(

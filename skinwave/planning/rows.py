@@ -5,7 +5,7 @@ import numpy as np
 from simple_model import Effort
 from simple_model.numbers import EN_DASH, change_text, percent, significant
 from skinwave.bodies.sheet import air_mass
-from skinwave.bodies.sizes import AT, coat, layer_name, thicknesses
+from skinwave.bodies.sizes import COAT_FREQUENCY, coat, layer_name, thicknesses
 from skinwave.models import Cost
 from skinwave.models.reduced import reduction_tolerance
 from skinwave.models.symmetry import axes_of_probes, mirrored_axes
@@ -102,15 +102,15 @@ def coat_rows(body: Body, h: float) -> list[PlanRow]:
     if shell:
         reason = (
             f"a Kirchhoff shell on the surface, because it is thinner than half an element of "
-            f"{1e3 * h:.3g} mm and than a tenth of a shear wavelength at {AT:g} Hz"
+            f"{1e3 * h:.3g} mm and than a tenth of a shear wavelength at {COAT_FREQUENCY:g} Hz"
         )
         below = body.strata[coated][1].shear_modulus
         ratio = max(solid.shear_modulus for solid in shell.materials) / below
         if ratio >= stiff_coat_ratio:
             reason += (
                 f"; it is {significant(ratio, 2)} times as stiff as the layer below: at 100 times, "
-                f"the error is at most 3{EN_DASH}15 % up to {AT:g} Hz for thicknesses of "
-                f"0.1{EN_DASH}1 mm"
+                f"the error is at most 3{EN_DASH}15 % up to {COAT_FREQUENCY:g} Hz for thicknesses "
+                f"of 0.1{EN_DASH}1 mm"
             )
         rows.append(PlanRow(what="coat", value=" and ".join(names[:coated]), reason=reason))
     if names[coated:]:

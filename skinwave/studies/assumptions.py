@@ -20,7 +20,7 @@ from meshes import Palm
 from simple_model import Material, MovingPressure, PronyTerm, Trajectory
 from simple_model.layers.material import PRESETS
 from simple_model.load.drive import PUBLISHED, usual_drive
-from skinwave.bodies.flattened import flattened
+from skinwave.bodies.flattened import flatten
 from skinwave.bodies.sizes import default_size
 from skinwave.models import point_kernel
 from skinwave.models.flat_body import FLAT_BODY
@@ -130,7 +130,7 @@ def infinite(scene: Scene, body: Body, h: float | None = None) -> Body:
     """Return the infinite flat body with the strata of another body under the scene's focus."""
     path = scene.tacton.trajectory
     places = np.vstack([path.position(np.zeros(1)), path.outline, scene.probe_points])
-    return flattened(body, places, element_size(scene, h))
+    return flatten(body, places, element_size(scene, h))
 
 
 def without(

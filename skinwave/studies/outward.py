@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.load_and_probe import on_surface
-from skinwave.bodies.flattened import meshed
+from skinwave.bodies.flattened import build_without_layers
 from skinwave.results.propagation import Reach
 from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Floats
@@ -71,4 +71,4 @@ def _on_body(body: Body, places: Floats, h: float) -> np.ndarray:
         half = np.array([body.width, body.height]) / 2
         about = np.maximum(np.abs(places), np.abs(places - body.placement.offset))
         return np.asarray((about < half).all(axis=1))
-    return on_surface(meshed(body, h).mesh, places)
+    return on_surface(build_without_layers(body, h).mesh, places)

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 import fem
 import meshes
 from fem.boundary import fixed_dofs
-from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from meshes import TetMesh
+from meshes.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from skinwave.typing import Floats
 from skinwave.verify.case import Check, Checks, below, case, order
 from skinwave.verify.setups import push, unit

@@ -161,7 +161,7 @@ def quarter_disc(radius: float, thickness: float, rings: int) -> TetMesh:
     below_it = first[ring[inner] + 1] + place[inner]
     outward = np.column_stack([inner, below_it, below_it + 1])
     inward = np.column_stack([inner, below_it + 1, inner + 1])[place[inner] < ring[inner]]
-    mesh = meshes.extruded(flat, np.vstack([outward, inward]), [-thickness, 0])
+    mesh = meshes.extrude_plane(flat, np.vstack([outward, inward]), [-thickness, 0])
     facets = meshes.boundary_facets(mesh.tets)
     x, y, z = np.moveaxis(mesh.points[facets[:, :3]], 2, 0)
     near = 1e-9 * radius

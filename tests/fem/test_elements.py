@@ -10,11 +10,11 @@ import pytest
 import fem
 import meshes
 from fem.assembly import element_stiffness
-from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule, triangle_rule
 from fem.geometry import gradients, jacobians, shape_nodes
 from fem.pressure_projection import macroelements, projected_divergence
 from fem.sparsity import SparsityPattern
 from meshes import TetMesh
+from meshes.elements import shape_derivatives, shape_functions, tetrahedron_rule, triangle_rule
 
 
 @pytest.mark.parametrize(

@@ -489,7 +489,7 @@ def test_a_surface_inside_another_is_refused(tmp_path):
     (skin + bone).save(tmp_path / "a.stl")
     assert "--inner" in refused(tmp_path / "a.stl")
     surface = read_contents(tmp_path / "a.stl")
-    kept, notes = meshes.repaired(surface.points, surface.triangles, keep_largest=True)
+    kept, notes = meshes.repair(surface.points, surface.triangles, keep_largest=True)
     assert len(kept.triangles) == skin.n_cells
     assert "94.1 %" in notes[-1]
 
@@ -519,9 +519,9 @@ def test_a_hand_with_seams_is_repaired_from_every_format(tmp_path, suffix):
     points, triangles = hand()
     WRITERS[suffix](tmp_path / f"hand{suffix}", points, triangles)
     raw = read_contents(tmp_path / f"hand{suffix}")
-    surface, _ = meshes.repaired(raw.points, raw.triangles)
+    surface, _ = meshes.repair(raw.points, raw.triangles)
     check(surface)
-    plain, said = meshes.repaired(points, triangles)
+    plain, said = meshes.repair(points, triangles)
     assert said_of(said, "along seams")
     assert volume(surface) == pytest.approx(volume(plain), rel=1e-4)
     np.testing.assert_allclose(surface.points.max(axis=0), plain.points.max(axis=0), atol=1e-6)

@@ -91,7 +91,7 @@ def test_a_missing_mesher_is_an_error(monkeypatch):
 def test_elements_follow_the_target_sizes():
     slab = Surface(points=cube().points * [3, 3, 0.5], triangles=cube().triangles)
     slab = Surface(points=slab.points - [0, 0, 0.005], triangles=slab.triangles)
-    sizing = meshes.graded(2e-3, meshes.Grading(radius=0.01, growth=1.3, coarsest=6e-3))
+    sizing = meshes.graded_sizing(2e-3, meshes.Grading(radius=0.01, growth=1.3, coarsest=6e-3))
     mesh = meshes.tetrahedralise(slab, 2e-3, sizing=sizing)
     asked = sizing(mesh.points[mesh.tets].mean(axis=1))
     ratio = meshes.edge_lengths(mesh).mean(axis=1) / asked

@@ -9,6 +9,7 @@ import pytest
 
 import meshes
 from meshes import MeshError, cache, reading, subprocess_call
+from meshes.files.abaqus import read_abaqus
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="no such files")
 NAMES = [f"{k:032x}" for k in range(9)]
@@ -40,19 +41,18 @@ def test_text_is_read_in_common_encodings(tmp_path):
             read(tmp_path / "x")
 
 
-def test_arrays_that_unpack_beyond_the_limit_are_refused(tmp_path, monkeypatch):
+def test_arrays_that_unpack_beyond_the_limit_are_refused(tmp_path):
     np.savez_compressed(tmp_path / "a.npz", x=np.zeros(100_000), y=np.array("text"))
     found = reading.load_arrays(tmp_path / "a.npz")
     assert found["x"].shape == (100_000,)
     assert str(found["y"]) == "text"
-    monkeypatch.setattr(reading, "MOST_UNPACKED", 100_000)
     with pytest.raises(ValueError, match="unpacks to 1 MB"):
-        reading.load_arrays(tmp_path / "a.npz")
+        reading.load_arrays(tmp_path / "a.npz", 100_000)
     np.savez(tmp_path / "b.npz", x=np.random.default_rng(0).random(100_000))
-    reading.load_arrays(tmp_path / "b.npz")  # takes as much on the disk
+    reading.load_arrays(tmp_path / "b.npz", 100_000)  # takes as much on the disk
 
 
-def test_time_and_memory_of_a_reader_are_limited(tmp_path, monkeypatch):
+def test_time_and_memory_of_a_reader_are_limited(tmp_path):
     node = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n"
     path = tmp_path / "a.inp"
     path.write_text(node)
@@ -60,13 +60,10 @@ def test_time_and_memory_of_a_reader_are_limited(tmp_path, monkeypatch):
     path.write_text(f"{node}*ELSET,ELSET=a,GENERATE\n1,1000000000000,1\n")
     with pytest.raises(MeshError, match="a.inp cannot be read"):
         meshes.read(path)
-    for name in ("LEAST_SECONDS", "SECONDS"):
-        monkeypatch.setattr(subprocess_call, name, 0.0)
     with pytest.raises(MeshError, match="longer than 0 s"):
-        meshes.read(path)
-    monkeypatch.setattr(subprocess_call, "LARGEST", 10)
+        subprocess_call.call_reader(read_abaqus, path, least_seconds=0.0, seconds_per_mb=0.0)
     with pytest.raises(MeshError, match="limit"):
-        meshes.read(path)
+        subprocess_call.call_reader(read_abaqus, path, largest=10)
 
 
 def test_a_separate_process_returns_results_and_errors():
@@ -88,8 +85,8 @@ def home(tmp_path, monkeypatch):
     return tmp_path / "cache"
 
 
-def stored(name, size=1000):
-    cache.store(name, {"version": 3}, x=np.arange(size // 8, dtype=np.float64))
+def stored(name, size=1000, limit=10**9):
+    cache.store(name, {"version": 3}, {"x": np.arange(size // 8, dtype=np.float64)}, limit)
 
 
 def test_a_damaged_entry_is_a_miss(home):
@@ -111,20 +108,18 @@ def left(home):
     return [name for name in NAMES if (home / f"{name}.npz").exists()]
 
 
-def test_the_least_recently_used_entries_are_removed_first(home, monkeypatch):
-    monkeypatch.setattr(cache, "LIMIT", 35_000)
+def test_the_least_recently_used_entries_are_removed_first(home):
     for k, name in enumerate(NAMES[:3]):
-        stored(name, 10_000)
+        stored(name, 10_000, 35_000)
         os.utime(home / f"{name}.npz", (k, k))
     assert cache.load(NAMES[0]) is not None  # now used last
-    stored(NAMES[3], 10_000)
+    stored(NAMES[3], 10_000, 35_000)
     assert left(home) == [NAMES[0], NAMES[2], NAMES[3]]
-    stored(NAMES[4], 40_000)  # alone above the limit
+    stored(NAMES[4], 40_000, 35_000)  # alone above the limit
     assert left(home) == [NAMES[4]]
 
 
-def test_other_files_in_the_cache_folder_are_kept(home, monkeypatch, tmp_path):
-    monkeypatch.setattr(cache, "LIMIT", 0)
+def test_other_files_in_the_cache_folder_are_kept(home, tmp_path):
     home.mkdir()
     (tmp_path / "thesis.npz").write_text("mine")
     (home / f"{NAMES[5]}.npz").symlink_to(tmp_path / "thesis.npz")
@@ -137,7 +132,7 @@ def test_other_files_in_the_cache_folder_are_kept(home, monkeypatch, tmp_path):
     for path in (old, new):
         path.write_text("half")
     os.utime(old, (0, 0))
-    stored(NAMES[0])
+    stored(NAMES[0], limit=0)
     assert sorted(home.iterdir()) == sorted([*before, new, home / f"{NAMES[0]}.npz"])
 
 
@@ -161,4 +156,4 @@ def test_the_cache_is_in_the_folder_of_the_platform(tmp_path, monkeypatch):
     monkeypatch.setattr(os.path, "expanduser", lambda path: path)  # as without a home
     assert cache.folder() is None
     assert cache.load("a") is None
-    cache.store("a", {}, x=np.ones(1))
+    cache.store("a", {}, {"x": np.ones(1)})

@@ -17,6 +17,7 @@ from simple_model.load.rhythm import ROLES
 from simple_model.load.tacton import SHARINGS
 from simple_model.load.trajectory import SWEEPS
 from skinwave import BODIES, Body, Scene, SkinwaveWarning, dumps, loads
+from skinwave.bodies.body import KINDS
 from skinwave.bodies.supports import CONDITIONS
 from skinwave.models import named
 from skinwave.models.limits import takes
@@ -263,8 +264,12 @@ def test_a_scene_comes_back_from_its_file(scene, tacton):
 @given(scenes())
 def test_planned_scenes_run(scene):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skinwave.bodies.sheet.SHEET_CELLS", 16)
-        patch.setattr("skinwave.bodies.slab.SLAB_CELL", 6e-3)
+        coarse = {
+            "sheet": lambda body: min(body.width, body.height) / 16,
+            "slab": lambda body: min(6e-3, max(body.depth / 2, 1.5e-3)),
+        }
+        for kind, size in coarse.items():
+            patch.setitem(KINDS, kind, replace(KINDS[kind], default_size=size))
         try:
             required = plan(scene, SolveOptions(tolerance=0.3))
         except ValueError:

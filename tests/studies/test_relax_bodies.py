@@ -10,7 +10,7 @@ import fem
 import simple_model
 import skinwave
 from simple_model import Tacton
-from skinwave.bodies.flattened import flattened
+from skinwave.bodies.flattened import flatten
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import BODIES, Body, Layer, Placement
 from skinwave.studies import relax
@@ -88,21 +88,21 @@ def test_steps_are_those_of_separate_runs():
 
 def test_the_flat_body_has_the_strata_under_the_focus(folder, monkeypatch):
     monkeypatch.chdir(folder)
-    at, bone = np.zeros((1, 2)), flattened(BODY["finger"], np.zeros((1, 2)), 2e-3)
+    at, bone = np.zeros((1, 2)), flatten(BODY["finger"], np.zeros((1, 2)), 2e-3)
     assert (bone.kind, bone.base, bone.sides, bone.layers) == ("slab", "clamped", "absorbing", ())
     assert bone.depth == pytest.approx(6e-3, rel=0.03)  # of tissue over the bone
-    two = flattened(BODY["mesh"], np.array([[1e-3, 2e-3], [0.2, 0.0]]), H)
+    two = flatten(BODY["mesh"], np.array([[1e-3, 2e-3], [0.2, 0.0]]), H)
     assert two.depth == pytest.approx(8e-3)
     assert [start for start, _ in two.strata] == pytest.approx([0, 4e-3])
     assert two.solid == fem.PRESETS["fat"]
     assert two.width == 0.4  # all places are on it
-    layered = flattened(replace(BODY["mesh"], layers=LAYERS), at, H)
+    layered = flatten(replace(BODY["mesh"], layers=LAYERS), at, H)
     assert [start for start, _ in layered.strata] == pytest.approx([0, 1e-3, 4e-3])
     palm = BODY["layered palm"]
-    assert flattened(palm, at, H).strata == palm.strata
-    assert flattened(BODY["half-space"], at, H) == BODY["half-space"]
+    assert flatten(palm, at, H).strata == palm.strata
+    assert flatten(BODY["half-space"], at, H) == BODY["half-space"]
     with pytest.raises(ValueError, match="not above the body"):
-        flattened(BODY["mesh"], np.array([[0.05, 0.0]]), H)
+        flatten(BODY["mesh"], np.array([[0.05, 0.0]]), H)
 
 
 def test_the_reach_lies_between_two_probes():

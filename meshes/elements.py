@@ -9,8 +9,8 @@ from itertools import permutations
 
 import numpy as np
 
-from fem.typing import Floats, Ints
 from meshes.tetmesh import EDGES
+from meshes.typing import Floats, Ints
 
 TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
