@@ -82,7 +82,8 @@ def air_around(
     of_y, of_x = (np.r_[0.5, np.ones(count - 2), 0.5] for count in shape)
     share, places = np.outer(of_y, of_x).ravel(), rows * shape[1] + columns
     normal = share[places, None] * np.cross(*axes)
-    # Deflections (k,) at the nodes, each times the area of its cell.
+    # Deflections (k,) at the nodes, each times the area of its cell. `pressure` maps such integrals
+    # (k, m) of accelerations to the pressures at the nodes.
     read = from_entries(normal, places[:, None], dofs_of(nodes), (len(nodes), mesh.n_dofs))[:, free]
     read = dy * dx * read
     images = [axis in mirrored for axis in "xy"]
@@ -94,21 +95,22 @@ def air_around(
     finest = 350.0  # rad/m, of the pressure in open air
     spare = 6  # functions of this pressure on the sheet more than the wavenumber requires
     if frame == np.inf:
-        pressure = _pressure_in_baffle(shape, (dy, dx), images[::-1], density)
+        field = near_field(shape, (dy, dx), images[::-1])
+
+        def pressure(w: Floats) -> Floats:
+            at_nodes = field(w.T.reshape(-1, *shape)).reshape(w.shape[1], -1).T
+            return np.asarray(density / np.pi / (dy * dx) * at_nodes)
+
         along = [] if images[0] else [np.tile(x, (len(y), 1))]
         along += [] if images[1] else [np.tile(y[:, None], (1, len(x)))]
         moments = {"monopole": [np.ones((len(y), len(x)))], "dipole": along}
         rates = {"monopole": density / np.pi / C, "dipole": density / (3 * np.pi * C**3)}
     else:
-        sizes = [
-            float(np.ptp(at)) * (1 + image) + 2 * frame
-            for at, image in zip((x, y), images, strict=True)
-        ]
+        spans = [np.ptp(at) * (1 + image) for at, image in zip((x, y), images, strict=True)]
+        sizes = [float(span) + 2 * frame for span in spans]
         orders = [
-            np.arange(
-                0, int(np.ceil(finest * size / 2 + spare * size / (size - 2 * frame))), 1 + image
-            )
-            for size, image in zip(sizes, images, strict=True)
+            np.arange(0, int(np.ceil(finest * size / 2 + spare * size / span)), 1 + image)
+            for size, span, image in zip(sizes, spans, images, strict=True)
         ]
         names = tuple(tuple(each.tolist()) for each in orders)
         inverse, integrals = open_air(tuple(sizes), names, density)
@@ -159,19 +161,6 @@ def growth(name: str, omega: Floats) -> Floats:
     """Return the factor (...) of a resistance at angular frequencies (...) in rad/s."""
     highest = 2 * np.pi * 1000.0  # rad/s: resistances of shorter waves grow no further
     return np.asarray(np.minimum(omega, highest) ** RESISTANCES[name])
-
-
-def _pressure_in_baffle(
-    shape: tuple[int, int], spacing: tuple[float, float], images: Sequence[bool], density: float
-) -> Callable[[Floats], Floats]:
-    """Return a function from integrals (n, k) of the acceleration over cells to pressures."""
-    field, cell = near_field(shape, spacing, images), spacing[0] * spacing[1]
-
-    def pressure(w: Floats) -> Floats:
-        fields = w.T.reshape(w.shape[1], *shape) / cell
-        return np.asarray(density / np.pi * field(fields).reshape(w.shape[1], -1).T)
-
-    return pressure
 
 
 def near_field(

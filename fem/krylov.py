@@ -72,10 +72,9 @@ def reduce(
     loads : (3 n, k) float, typical nodal forces for the error estimate. Without them, the error is
         that of the probes' adjoint fields in the whole body, which needs far more moments.
     air : around a sheet, from `air_around`; the body must then be constrained
-    weighted : whether the sizes of the probes' rows count, as in a `load_subspace`. The basis then
-        follows weak ones, and frequencies with a weak response, only as far as the tolerance of
-        the strongest response needs
-    rate : order of the time derivative of the response that is meant, 1 for velocity
+    weighted : whether errors are relative to the strongest response at any frequency, not at each,
+        as for a `load_subspace`. Weak probes then get fewer moments.
+    rate : order of the time derivative whose error counts, 1 for velocity
     point : expansion point, rad/s. Ignored with `air`, and with Maxwell branches, where the band
         sets it
     most_moments : largest number of moments
@@ -170,7 +169,7 @@ class KrylovBasis:
         self._small_rests: list[Any] = [None if r is None else self._small_K for r in self._rests]
         self._rows = np.empty((0, 0))
         self.size = 0
-        self.followed: int | None = None  # vectors of a moment that have a next one, if not all
+        self.followed: int | None = None  # vectors of a moment that get a next one, None for all
 
     @property
     def basis(self) -> Floats:
@@ -280,37 +279,34 @@ def _iterate(
     The rows begin with those of the probes; `directions` (p, k) combine these to the vectors of a
     moment.
     """
-    probes, left = len(directions), 0.0
+    probes, dropped = len(directions), 0.0  # error of vectors that get no further moments
     frequencies, coarse_step = 41, 5  # where the error is computed; at first only every fifth
     # Not 0 Hz itself, where an unconstrained body has no finite response.
     fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, frequencies), np.complex128)
     coarse = fine[::coarse_step]  # until the error is below the tolerance there
     at, before, response, first, error = 0, (0, 0), None, np.inf, np.inf
-    # Moments between two error estimates: at least this many, which give the error to a factor of
-    # 4, and this share of all, because estimating the error of a large model costs more than its
-    # moments.
-    fewest_between = 3
-    share_between = 1 / 16
     weak_share = 0.3  # of the tolerance: error of weak start vectors that have no more moments
     for moments, size in growing:
-        if moments < at + max(fewest_between, share_between * moments):
+        # At least three moments give the error to a factor of 4. A sixteenth of all, because
+        # estimating the error of a large model costs more than its moments.
+        if moments < at + max(3, moments / 16):
             continue
         at = moments
         space.project(rows, size)
         now = _band_response(space, probes, coarse, size, rate)
         if response is not None:
-            error = np.hypot(_largest_change(response, now, weighted), left)
+            error = np.hypot(_largest_change(response, now, weighted), dropped)
             if error <= tolerance:
                 earlier, latest = (
                     _band_response(space, probes, fine, each, rate) for each in (before[1], size)
                 )
-                error = np.hypot(_largest_change(earlier, latest, weighted), left)
+                error = np.hypot(_largest_change(earlier, latest, weighted), dropped)
             if weighted:
                 each = _changes(response, now, weighted, directions)[:, : space.followed]
                 ends = np.sqrt(np.cumsum(each[:, ::-1] ** 2, axis=1)).max(axis=0)[::-1]
-                weak = np.hypot(ends, left) <= weak_share * tolerance
+                weak = np.hypot(ends, dropped) <= weak_share * tolerance
                 space.followed = max(1, int(np.count_nonzero(~weak)))
-                left = float(np.hypot(left, ends[space.followed :].max(initial=0.0)))
+                dropped = float(np.hypot(dropped, ends[space.followed :].max(initial=0.0)))
             first = error if first == np.inf else first
             report(max(0.0, np.log(error / first) / np.log(tolerance / first)))
             if error <= tolerance:
@@ -326,23 +322,21 @@ def _expansion(
     operators: Operators, air: Air | None, band: float, point: float
 ) -> tuple[float, Operators]:
     """Return the expansion point in rad/s, and the operators with the added mass."""
-    # Expansion point over the band with Maxwell branches, where waves of high frequency lose little
-    # and many of them matter. Best between 0.8 and 1.6; the point above needs nearly twice as many
-    # moments.
-    relaxing_point = 1.0
     if air is None:
-        return 2 * np.pi * relaxing_point * band if operators.branches else point, operators
+        # With Maxwell branches, waves of high frequency lose little, and many of them matter: the
+        # best point is 0.8 to 1.6 times the band. The point given needs nearly twice the moments.
+        return 2 * np.pi * band if operators.branches else point, operators
     return 0.0, replace(operators, M=aslinearoperator(operators.M) + air.mass)
 
 
 def _independent(start_vectors: Floats) -> tuple[Floats, Floats]:
-    """Return independent unit directions (n, d) of vectors (n, p), the strongest first, and the
-    unit combinations (p, d) that they are: probes on a clamped edge do not move, and probes in one
-    element may be linearly dependent.
+    """Return independent unit directions (n, d) in the span of vectors (n, p), the strongest first,
+    and the unit combinations (p, d) of the vectors along them.
+
+    Probes on a clamped edge do not move, and probes in one element may be linearly dependent.
     """
     squares, directions = np.linalg.eigh(start_vectors.T @ start_vectors)
-    probe_rank = 1e-6  # of the largest singular value: probes that differ by less are dependent
-    distinct = squares > probe_rank**2 * squares[-1]
+    distinct = squares > 1e-12 * squares[-1]  # squared singular values; the others are dependent
     directions = directions[:, distinct][:, ::-1]
     return start_vectors @ (directions / np.sqrt(squares[distinct])[::-1]), directions
 
@@ -395,9 +389,7 @@ def _combine(basis: Floats, coordinates: Floats) -> Floats:
 def _inner(basis: Floats, block: Floats) -> Floats:
     """Return the inner products basis^T block (size, k) of tall matrices."""
     products = np.zeros((block.shape[1], basis.shape[1]))
-    # Rows of tall matrices per inner product, so that they stay in the processor's cache: 100 by 5
-    # inner products of 128,000 rows take 5.5 ms, and 18 ms by one multiplication.
-    rows = 512
+    rows = 512  # that stay in the processor's cache: a third of the time of one multiplication
     for start in range(0, len(basis), rows):
         products += block[start : start + rows].T @ basis[start : start + rows]
     return products.T

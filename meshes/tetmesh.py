@@ -283,7 +283,10 @@ def check_finite(points: Floats) -> None:
 def check_node_numbers(what: str, nodes: Ints, points: Floats) -> None:
     """Refuse numbers that do not belong to any of the points (n, 3)."""
     if nodes.min() < 0 or nodes.max() >= len(points):
-        raise MeshError(f"{what} run from {nodes.min()} to {nodes.max()} for {len(points)} points")
+        raise MeshError(
+            f"{what} run from {nodes.min()} to {nodes.max()} for {len(points)} points; number the "
+            "points from 0"
+        )
 
 
 def _orient(points: Floats, tets: Ints) -> Ints:

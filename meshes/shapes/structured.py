@@ -74,8 +74,7 @@ def sheet(
         with_planes(_cells(size, h), wanted)
         for size, wanted in zip((width, height), planes, strict=True)
     )
-    lines = x, y, np.linspace(-thickness, 0.0, layers + 1)
-    mesh = extrude(*lines, order=order)
+    mesh = extrude(x, y, np.linspace(-thickness, 0.0, layers + 1), order=order)
     return replace(mesh, facets={**mesh.facets, "clamped": mesh.facets["sides"]})
 
 

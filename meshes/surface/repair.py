@@ -248,9 +248,8 @@ def _inward_triangles(surface: Surface) -> np.ndarray:
     starts = surface.triangles.ravel()
     against = starts[pairs[:, 0]] == starts[pairs[:, 1]]
     # Each triangle is listed twice, as given and reversed. Neighbours that agree are linked.
-    links = [np.column_stack([t, other + n * against]),
-             np.column_stack([t + n, other + n * ~against])]  # fmt: skip
-    label = connected_components(2 * n, np.vstack(links))
+    links = [(t, other + n * against), (t + n, other + n * ~against)]
+    label = connected_components(2 * n, np.hstack(links).T)
     if (one_sided := np.flatnonzero(label[:n] == label[n:])).size:
         raise MeshError(
             f"{len(one_sided):,} triangles belong to a surface with only one side, like a "

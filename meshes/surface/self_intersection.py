@@ -111,9 +111,7 @@ def _pierces(
 def _overlap(p: Floats, q: Floats, scale: Floats) -> np.ndarray:
     """Whether triangles in one plane overlap: no side of either one separates them."""
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    apart = np.linalg.norm(normal, axis=1) <= (
-        ROUND_OFF * scale**2
-    )  # degenerate triangles do not overlap
+    apart = np.linalg.norm(normal, axis=1) <= ROUND_OFF * scale**2  # degenerate ones do not overlap
     for one, other in ((p, q), (q, p)):
         for j in range(3):
             side = one[:, (j + 1) % 3] - one[:, j]
@@ -122,7 +120,6 @@ def _overlap(p: Floats, q: Floats, scale: Floats) -> np.ndarray:
             a = np.einsum("eaj,ej->ea", one, across)
             b = np.einsum("eaj,ej->ea", other, across)
             slack = ROUND_OFF * scale
-            apart |= (a.max(axis=1) <= b.min(axis=1) + slack) | (
-                b.max(axis=1) <= a.min(axis=1) + slack
-            )
+            apart |= a.max(axis=1) <= b.min(axis=1) + slack
+            apart |= b.max(axis=1) <= a.min(axis=1) + slack
     return ~apart

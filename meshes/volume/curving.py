@@ -42,7 +42,11 @@ def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> Te
 
     def target(points: Floats, nodes: Ints) -> Floats:
         """Positions of nodes on the level set, unchanged if it is too far away."""
-        moved = project_to_level_set(points[nodes], level_set, gradient)
+        moved = points[nodes]
+        for _ in range(4):  # Newton steps along the gradient
+            slope = gradient(moved)
+            steepness = np.maximum(np.einsum("ni,ni->n", slope, slope), 1e-12)
+            moved = moved - (level_set(moved) / steepness)[:, None] * slope
         distance = np.linalg.norm(moved - points[nodes], axis=1)
         is_near = (distance < reach[nodes]) & (np.abs(level_set(moved)) < 1e-3 * reach[nodes])
         return np.where(is_near[:, None], moved, points[nodes])
@@ -60,15 +64,6 @@ def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> Te
     points, count = keep_jacobians(mesh.tets, straight, points)
     log.info("curved %d edges, %d stay straight", len(middles) - count, count)
     return replace(mesh, points=points)
-
-
-def project_to_level_set(points: Floats, level_set: Function, gradient: Function) -> Floats:
-    """Return points (n, 3) moved onto a nearby level set by Newton steps along its gradient."""
-    for _ in range(4):
-        slope = gradient(points)
-        steepness = np.maximum(np.einsum("ni,ni->n", slope, slope), 1e-12)
-        points = points - (level_set(points) / steepness)[:, None] * slope
-    return points
 
 
 def _mean_edge(mesh: TetMesh) -> Floats:

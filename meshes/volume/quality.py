@@ -84,7 +84,10 @@ def check_one_body(
     touches itself at a point, or intersects itself.
     """
     _check_overlaps(mesh)
-    body, volumes = _bodies(mesh)
+    beyond = neighbours(mesh.tets)
+    tet, face = np.nonzero(beyond >= 0)
+    body = connected_components(len(mesh.tets), np.column_stack([tet, beyond[tet, face]]))
+    volumes = np.bincount(body, corner_volumes(mesh.points, mesh.tets))
     if len(volumes) > 1 and not keep_largest:
         listed = ", ".join(f"{1e6 * volume:.3g}" for volume in np.sort(volumes)[::-1][:5])
         raise MeshError(
@@ -114,11 +117,3 @@ def _check_overlaps(mesh: TetMesh) -> None:
             f"tetrahedra of the mesh overlap at {len(twice):,} of their faces, first near "
             f"{middle}; mesh the body again"
         )
-
-
-def _bodies(mesh: TetMesh) -> tuple[Ints, np.ndarray]:
-    """The body (m,) of each tetrahedron, and the volume of each body in m3."""
-    beyond = neighbours(mesh.tets)
-    tet, face = np.nonzero(beyond >= 0)
-    body = connected_components(len(mesh.tets), np.column_stack([tet, beyond[tet, face]]))
-    return body, np.bincount(body, corner_volumes(mesh.points, mesh.tets))

@@ -46,7 +46,7 @@ def tetrahedralise(
     Parameters
     ----------
     h : float, m, target edge length
-    inner : region name -> closed surface inside the outer one, or cut off with it at one plane
+    inner : region name -> closed surface inside the outer one, or cut at the same plane
     sizing : function of points (n, 3) that returns target edge lengths (n,) in m; None for h
         everywhere
     timeout : float, s, limit for the mesher

@@ -199,8 +199,8 @@ FRAME = Mounting()
 
 
 def check_extent(mounting: Mounting, width: float, height: float) -> None:
-    """Refuse clips outside a sheet, width and height in m, a curl that is not shallow, and a frame
-    wider than the sheet and than the default.
+    """Refuse clips outside a sheet of a width and height in m, a curl that is not shallow, and a
+    frame that is wider than both the sheet and the default frame.
     """
     steepest = 0.05  # rise over side of a curled sheet: slopes of 0.2 at its edges
     for name, side in (("curl_x", width), ("curl_y", height)):
