@@ -212,8 +212,8 @@ def line_solution(
     The operators F of air can only be applied. P = A - sum w F + E is factorised, where E is the
     equivalent added mass of the bending waves of this line, `fluid_share` of the body's own mass.
     Waves with other wavenumbers do not resonate, so P^-1 (P + sum w F - E) is near the identity and
-    GMRES needs few iterations. Raises Diverged if it does not converge in some `cycles` of
-    `restart` iterations.
+    GMRES needs few iterations. Raises Diverged if it does not converge in a number of `cycles` with
+    `restart` iterations each.
     """
     dry = affine.in_vacuum()
     is_mass = np.array([kind == "mass" for kind, _ in dry.terms])

@@ -45,8 +45,8 @@ def static(
     start : (3 n,) float, m, initial guess; undeformed by default
     tolerance : largest residual relative to the force; or, for residuals below 1e-5, largest
         correction relative to the displacement
-    most_iterations : of Newton's method in a load step
-    most_halvings : of a load step that does not converge
+    most_iterations : largest number of Newton iterations in a load step
+    most_halvings : how often a load step is halved if it does not converge
     solver : backend of `factorise`
 
     Returns
@@ -164,8 +164,8 @@ def dynamic(
     ----------
     initial : state with initial displacement and velocity; at rest by default
     tolerance : last Newton correction relative to the displacement of the step
-    most_iterations : of Newton's method in a step
-    most_halvings : of a step that does not converge
+    most_iterations : largest number of Newton iterations in a step
+    most_halvings : how often a step is halved if it does not converge
     """
     check_step(dt)
     march = _March(body, force, tolerance, most_iterations, solver)

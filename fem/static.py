@@ -61,7 +61,7 @@ def modes(
     ----------
     n : number of modes
     solver : backend of `factorise`
-    most_restarts : of the Lanczos method
+    most_restarts : largest number of restarts of the Lanczos method
 
     Returns
     -------

@@ -147,8 +147,8 @@ def _patch(mesh: TetMesh, owner: int, point: Floats) -> Ints:
 
 
 def _fit(mesh: TetMesh, patches: list[Ints], used: Ints, points: Floats) -> sparse.csr_array:
-    """Return weights (p, 4 k) of the samples in the used elements (k,): the value at each point of
-    the polynomial that best fits the samples in its patch.
+    """Return weights (p, 4 k) of the samples in the used elements (k,). They give the value at each
+    point of the polynomial that best fits the samples in its patch.
     """
     places = _sample_places(mesh, used)
     values, columns = [], []

@@ -42,7 +42,7 @@ def key(*parts: object) -> str:
 
 
 def digest(*parts: object) -> str:
-    """Return the SHA-256 of arrays by type, shape and bytes, and of other objects by their repr."""
+    """Return a SHA-256 hash of arrays (type, shape, bytes) and of other objects (their repr)."""
     sha = hashlib.sha256()
     for part in parts:
         if isinstance(part, np.ndarray):

@@ -45,7 +45,7 @@ def shift_to_origin(surface: Surface) -> Floats:
     low, cell, depth = _outline(surface)
     i, j = np.floor(-low / cell + 1).astype(int)
     in_raster = 0 <= i < depth.shape[0] and 0 <= j < depth.shape[1]
-    inside, level = 3e-3, 1e-4  # m: smallest distance from the outline, largest from the top
+    inside, level = 3e-3, 1e-4  # m: least distance from the outline, largest height off the top
     if in_raster and depth[i, j] * cell >= min(inside, radius / 2):
         x = y = 0.0
     height = height_at(surface, x, y)

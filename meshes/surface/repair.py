@@ -204,7 +204,7 @@ def _open_edges(triangles: Ints) -> Ints:
 
 
 def _gap(points: Floats, ends: Ints, samples: int = 9) -> tuple[float, float]:
-    """Median distance in m between open edges (m, 2), and over their length; inf for one edge."""
+    """Median distance between open edges (m, 2): in m, and over their length; inf for one edge."""
     from scipy.spatial import cKDTree
 
     a, b = points[ends].swapaxes(0, 1)

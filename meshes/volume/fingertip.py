@@ -114,7 +114,9 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
 
 
 def _reduce_curvature(mesh: TetMesh, curved: Floats) -> Floats:
-    """Curved nodes (n, 3), less so where elements would be distorted, as in a coarse bone."""
+    """Curved nodes (n, 3), with less curvature where elements would be distorted, as in a coarse
+    bone.
+    """
     share, change = np.ones((len(curved), 1)), curved - mesh.points
     for _ in range(6):
         bad = jacobian_ratios(mesh.points + share * change, mesh.tets) < LEAST_RATIO
