@@ -33,7 +33,7 @@ from simple_model.layers.material import from_young
 from skinwave.bodies.sizes import default_size
 from skinwave.models import plate_modes
 from skinwave.models.options import SolveOptions, sample_times
-from skinwave.models.plate_modes import COUNTS, STRETCHED, Run, sheet_motion
+from skinwave.models.plate_modes import ACCURACY, STRETCHED, Run, sheet_motion
 from skinwave.models.reduced import answer, prepare
 from skinwave.models.relative_change import relative_changes
 from skinwave.planning.plan import plan
@@ -233,7 +233,7 @@ def seconds_of(call: Callable[..., object], *arguments: object) -> float:
 def _added(drawn: Scene, count: int, steps: int) -> Floats:
     """Return what stretching adds to a response (t, p), with modes and steps as in `Run`."""
     run = Run(count=count, steps=steps)
-    return plate_modes.added_by_stretching(drawn, sample_times(drawn), run)
+    return plate_modes.stretching_in_run(drawn, sample_times(drawn), run)
 
 
 def assess_sheets() -> None:
@@ -246,10 +246,10 @@ def assess_sheets() -> None:
         added = partial(_added, drawn)
         lines = seconds_of(plate_modes.steady_lines, drawn)
         planning = seconds_of(plan, drawn, SolveOptions())
-        one = seconds_of(added, COUNTS[0], steps - 1)  # the plate is known from the plan
+        one = seconds_of(added, ACCURACY.counts[0], steps - 1)  # the plate is known from the plan
         answered = seconds_of(compute, drawn, STRETCHED.name)
         mapped = seconds_of(sheet_motion, drawn, SolveOptions().tolerance)
-        found = plate_modes.stretched(
+        found = plate_modes.solve_stretching(
             drawn, len(times), float(times[1]), SolveOptions().tolerance, None
         )
         fine, coarse = (added(MOST_MODES[0], n * steps) for n in (4, 2))

@@ -29,50 +29,16 @@ from skinwave.bodies import sheet
 from skinwave.bodies.analytic import compliance, stack
 from skinwave.bodies.parts import FLAT
 from skinwave.bodies.sizes import thicknesses
-from skinwave.models import Cost, Limit, Model, register
-from skinwave.models.costs import (
-    DURATION,
-    LINES,
-    PROBES,
-    PROCESS,
-    START,
-    SYNTHESIS,
-    computed_times,
-    knot_count,
-    lines_below,
-    synthesis,
-)
+from skinwave.models import Cost, Limit, Model, limits, register
+from skinwave.models.costs import UNITS, Cheaper, computed_times, lines_below, synthesis
 from skinwave.models.laws import has_table
-from skinwave.models.limits import (
-    displacement_at_surface,
-    isotropic_limits,
-    load_limit,
-    of_body,
-    of_part,
-    reading_limit,
-)
-from skinwave.models.options import SolveOptions, response_of, sample_times
-from skinwave.models.plate_modes import without_shear
+from skinwave.models.options import Solve, SolveOptions, response_of, sample_times
+from skinwave.models.plate_modes import shear_part
 from skinwave.models.relative_change import relative_changes
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
-LAYERS = (
-    "E. Kausel, J. M. Roesset: Stiffness matrices for layered soils. Bulletin of the Seismological "
-    "Society of America 71 (1981) 1743-1761"
-)
-STEP = "wavenumber integral"
-INTEGRAL_ERROR = 0.002  # compared with finite elements
-SHEARED_DURATION = 0.1  # s of the responses of a thin and a thick sheet that are compared
-# Error of a thin sheet over the effect of shear and rotary inertia: 0.6 to 1.2, by layered bodies.
-INDENTED = 1.25
-# Seconds of a wavenumber, a frequency and a layer; of a sample, a distance and a probe in a
-# transform; of a wavenumber and a distance; of a distance, a probe and a position of the path.
-EVALUATION, TRANSFORM, BESSEL, PATTERN = 2.5e-7, 2.5e-8, 4e-7, 1.2e-8
-# Evaluations of a transient with much loss; loss tangent at a frequency in Hz below which they
-# increase; wavenumbers of a line times that tangent.
-EVALUATIONS, RESONANT, LOSS_AT, RESONANT_NODES = 1.1e5, 0.12, 200.0, 30.0
-Solve = Callable[[Scene, Floats, SolveOptions], Response]
+METHOD = "wavenumber integral"
 
 
 def _solver(model: str, normal: Callable[..., Response], history: Callable[..., Floats]) -> Solve:
@@ -81,7 +47,7 @@ def _solver(model: str, normal: Callable[..., Response], history: Callable[..., 
     """
 
     def solve(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-        options.progress(STEP, 0.0)
+        options.progress(METHOD, 0.0)
         if scene.reading.is_plain and scene.load.is_plain:
             return normal(compliance(scene.body), scene.pressure, scene.probe_points, times)
         started, depths = time.perf_counter(), np.array(scene.depths)
@@ -118,18 +84,22 @@ def field_read(scene: Scene, depth: float) -> Field:
 
 def _parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
     """Yield the parts of the error of a wavenumber integral, compared with finite elements."""
+    error = 0.002  # compared with finite elements
     yield ErrorPart(
-        name="integral", source="the wavenumber integral", error=INTEGRAL_ERROR,
-        cure=f"use a tolerance of {100 * INTEGRAL_ERROR:g} % or more, the limit of the method",
+        name="integral", source="the wavenumber integral", error=error,
+        cure=f"use a tolerance of {100 * error:g} % or more, the limit of the method",
     )  # fmt: skip
     if scene.body.of_kind.is_plate:
-        yield without_shear(scene, INDENTED * _effect_of_shear(scene))
+        # The error of a thin sheet is 0.6 to 1.2 times the effect of shear, by layered bodies.
+        yield shear_part(scene, 1.25 * _effect_of_shear(scene))
 
 
-def _effect_of_shear(scene: Scene) -> float:
-    """Return the relative change of a sheet's motion by shear and rotary inertia."""
+def _effect_of_shear(scene: Scene, longest: float = 0.1) -> float:
+    """Return the relative change of a sheet's motion by shear and rotary inertia, in the first
+    part of a response, at most `longest` s.
+    """
     times = sample_times(scene)
-    times = times[: max(2, int(np.searchsorted(times, SHEARED_DURATION)))]
+    times = times[: max(2, int(np.searchsorted(times, longest)))]
     thin, thick = (
         field_history(surface_field(DISPLACEMENT, each), scene.pressure, scene.probe_points, times)
         for each in (
@@ -147,10 +117,10 @@ def _limits(scene: Scene) -> Iterator[Limit]:
     if body.placement != FLAT:
         yield Limit(
             why="needs a body that lies flat at the origin, not a tilted or moved one",
-            cure="remove [placement]", change=of_body(placement=FLAT),
+            cure="remove [placement]", change=limits.of_body(placement=FLAT),
         )  # fmt: skip
     if body.of_kind.is_plate:
-        yield from isotropic_limits(body)
+        yield from limits.isotropic_limits(body)
     if gaussian_sum(pressure.height, pressure.profile) is None:
         yield Limit(
             why=f"needs a Gaussian focus or a map, not the profile {pressure.profile_name}",
@@ -161,13 +131,13 @@ def _limits(scene: Scene) -> Iterator[Limit]:
         )
     of_surface = reading.record.is_normal and reading.is_on_surface
     if body.of_kind.is_plate and not of_surface:
-        yield reading_limit(scene)
+        yield limits.reading_limit(scene)
     if not load.is_plain and (body.of_kind.is_plate or load.gravity or load.support_motion):
-        yield load_limit(scene)
+        yield limits.load_limit(scene)
     elif not (load.is_plain or of_surface):
         yield Limit(
             why=f"does not compute {reading.words} under {load.words}",
-            cure="read the displacement at the surface", change=displacement_at_surface,
+            cure="read the displacement at the surface", change=limits.displacement_at_surface,
         )  # fmt: skip
 
 
@@ -183,91 +153,101 @@ def _steady_limits(scene: Scene) -> Iterator[Limit]:
 def _with_loss(scene: Scene) -> Scene:
     """Return the scene with a loss tangent of 0.1 at 100 Hz."""
     viscosity = 0.1 * scene.body.solid.shear_modulus / (2 * np.pi * 100)
-    return of_part("solid", viscosity=viscosity)(scene)
+    return limits.of_part("solid", viscosity=viscosity)(scene)
 
 
-def _distances(scene: Scene) -> tuple[int, int]:
-    """Return the numbers of distances at which a field is integrated, and of Gaussians."""
+def _distances(scene: Scene, pattern: float = 1.2e-8) -> tuple[int, int, float]:
+    """Return the numbers of distances at which a field is integrated and of Gaussians, and the
+    seconds of a position of the path; `pattern` is in s of a distance and a probe.
+    """
     pressure = scene.pressure
     spot = gaussian_sum(pressure.height, pressure.profile)
     assert spot is not None  # the limits
     far = furthest(scene.probe_points, path_samples(pressure), spot)
-    return spline_steps(far / spot.width), len(spot.shares)
+    distances = spline_steps(far / spot.width)
+    return distances, len(spot.shares), pattern * len(scene.probes) * distances
 
 
-def _integrals(scene: Scene) -> tuple[int, int, float, float]:
+def _integrals(scene: Scene, omega: float) -> tuple[int, int, float, float]:
     """Return the numbers of fields and of their integrals, the seconds of a wavenumber at a
-    frequency, and the loss tangent at `LOSS_AT`, which keeps poles off the path of integration.
+    frequency, and the loss tangent at `omega` in rad/s, which keeps poles off the path of
+    integration.
     """
     body, depths = scene.body, sorted(set(scene.depths))
     layers = sum(isfinite(each) for each in thicknesses(body.strata)) + isfinite(body.depth)
     fields = [each for depth in depths for each in fields_read(scene, depth)]
     terms = sum(int(np.count_nonzero(each.uses)) for each in fields)
-    omega = 2 * pi * LOSS_AT
     moduli = [solid.complex_modulus(omega) for _, solid in body.strata]
     loss = max(float(each.imag / each.real) for each in moduli) if isfinite(body.depth) else 1.0
     is_plain = scene.reading.is_plain and scene.load.is_plain
     orders = 1.0 if is_plain else sum(len(each.orders) for each in fields) / len(fields)
-    return len(fields), terms, EVALUATION * (0.5 + layers) * orders, loss
+    evaluation = 2.5e-7  # s of a wavenumber, a frequency and a layer
+    return len(fields), terms, evaluation * (0.5 + layers) * orders, loss
 
 
 def _cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
-    times, count = computed_times(scene, options), len(scene.probes)
-    distances, gaussians = _distances(scene)
-    fields, terms, evaluation, loss = _integrals(scene)
+    times, count, omega = computed_times(scene, options), len(scene.probes), 2 * pi * 200.0
+    distances, gaussians, position = _distances(scene)
+    fields, terms, evaluation, loss = _integrals(scene, omega)
     _, padded = transform_samples(times)
-    damped = loss - 2 * log(WRAP_AROUND) / (padded / TRANSFORM_RATE) / (2 * pi * LOSS_AT)
-    evaluations = fields * EVALUATIONS * max(1.0, (RESONANT / damped) ** 2)
+    damped = loss - 2 * log(WRAP_AROUND) / (padded / TRANSFORM_RATE) / omega
+    # Evaluations with much loss; loss tangent below which they increase; s of a sample, a distance
+    # and a probe in a transform.
+    least, resonant, transform = 1.1e5, 0.12, 2.5e-8
+    evaluations = fields * least * max(1.0, (resonant / damped) ** 2)
     parts = oversampling(highest_line(scene.pressure), 1 / TRANSFORM_RATE)
     folded = is_folded(scene.pressure, times)
     parts = 1 if folded else max(parts, 1 + is_abrupt(scene.pressure))
     transformed = terms / fields * count * distances * padded * parts
-    made = count * padded * lines_below(scene, times) * SYNTHESIS[0] if folded else 0.0
+    made = count * padded * lines_below(scene, times) * UNITS.line[0] if folded else 0.0
     at_once = min(distances * padded * parts, AT_ONCE)
+    along_path = position * (gaussians - 1) * len(path_samples(scene.pressure))
+    values = padded * (3 * count * terms / fields + distances)
     return Cost(
         parts={
-            f"{PROBES}, or a smaller path": START
-            + TRANSFORM * transformed
-            + PATTERN * count * distances * (gaussians - 1) * knot_count(scene),
-            LINES: made,
-            "use a material with more loss": evaluation * evaluations,
+            f"{Cheaper.PROBES}, or a smaller path": UNITS.start
+            + transform * transformed
+            + along_path,
+            Cheaper.LINES: made,
+            Cheaper.LOSS: evaluation * evaluations,
         },
-        memory=PROCESS + 48 * at_once + 8 * padded * (3 * count * terms / fields + distances),
+        memory=UNITS.process + 48 * at_once + 8 * values,
     )
 
 
 def _steady_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
-    times, (distances, gaussians) = computed_times(scene, options), _distances(scene)
-    fields, _, evaluation, loss = _integrals(scene)
-    nodes = min(max(RESONANT_NODES / loss, FEWEST_NODES), MOST_NODES)
+    times, (distances, gaussians, position) = computed_times(scene, options), _distances(scene)
+    fields, _, evaluation, loss = _integrals(scene, 2 * pi * 200.0)
+    # Wavenumbers of a line times its loss tangent; s of a wavenumber and a distance.
+    resonant, bessel = 30.0, 4e-7
+    nodes = min(max(resonant / loss, FEWEST_NODES), MOST_NODES)
     lines = lines_below(scene, times)
     seconds, size = synthesis(scene, times)
     evaluations = fields * max(2 * nodes, 3 * FEWEST_NODES) * lines
     return Cost(
         parts={
-            DURATION: START + seconds,
-            LINES: PATTERN
-            * len(scene.probes)
-            * distances
-            * (gaussians * knot_count(scene) + lines),
-            "use a material with more loss": evaluation * evaluations
-            + BESSEL * fields * nodes * distances,
+            Cheaper.DURATION: UNITS.start + seconds,
+            Cheaper.LINES: position * (gaussians * len(path_samples(scene.pressure)) + lines),
+            Cheaper.LOSS: evaluation * evaluations + bessel * fields * nodes * distances,
         },
-        memory=PROCESS + size + 16 * nodes * distances,
+        memory=UNITS.process + size + 16 * nodes * distances,
     )
 
 
 FLAT_BODY = register(
     Model(
         name="flat-body",
-        method=STEP,
+        method=METHOD,
         words="linear waves of a laterally infinite flat body, by the wavenumber integral",
         solve=_solver("flat-body", simple_model.flat_body, field_history),
         limits=_limits,
         parts=_parts,
         cost=_cost,
         colour="#009E73",
-        sources=(LAYERS,),
+        sources=(
+            "E. Kausel, J. M. Roesset: Stiffness matrices for layered soils. Bulletin of the "
+            "Seismological Society of America 71 (1981) 1743-1761",
+        ),
         is_infinite=True,
         takes_series=has_table,
     )

@@ -24,19 +24,7 @@ from skinwave.bodies.build import Build
 from skinwave.bodies.parts import PHALANX, PLAIN
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import Cost, Limit, Model, meshed, register
-from skinwave.models.costs import (
-    DURATION,
-    LINES,
-    MESH,
-    PROBES,
-    PROCESS,
-    REDUCED,
-    START,
-    SUMMED,
-    computed_times,
-    lines_below,
-    synthesis,
-)
+from skinwave.models.costs import UNITS, Cheaper, computed_times, lines_below, synthesis
 from skinwave.models.laws import has_own_law, relaxing, series_tolerance
 from skinwave.models.limits import held_air_limits, of_body, vacuum_limits
 from skinwave.models.options import SolveOptions, response_of, solver_name
@@ -47,34 +35,16 @@ from skinwave.scene.scene import Scene
 from skinwave.system.effort import Clock, Progress
 from skinwave.typing import Floats
 
-REDUCTION = (
-    "Z. Bai, Y. Su: Dimension reduction of large-scale second-order dynamical systems via a "
-    "second-order Arnoldi method. SIAM Journal on Scientific Computing 26 (2005) 1692-1709"
-)
-ARNOLDI = (
-    "D. Lu, Y. Su, Z. Bai: Stability analysis of the two-level orthogonal Arnoldi procedure. SIAM "
-    "Journal on Matrix Analysis and Applications 37 (2016) 195-214"
-)
-NEWMARK = (
-    "N. M. Newmark: A method of computation for structural dynamics. Journal of the Engineering "
-    "Mechanics Division 85 (1959) 67-94"
-)
-MACROELEMENTS = (
-    "R. Stenberg: Analysis of mixed finite element methods for the Stokes problem: a unified "
-    "approach. Mathematics of Computation 42 (1984) 9-23"
-)
-MOST_SLENDER = 10  # ratio of the sides of a sheet that its default elements can mesh
-FINITE = 15e-3  # m: a finite depth in place of a half-space, or below its layers and probes
-THICKER = 1.25  # from one trial thickness to the next
-BALANCE_STEPS = 50  # of a transient, between checks of its energy balance
-TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
-MOST_LINES = 1000  # of fem-harmonic, each a factorisation
-# For n degrees of freedom, seconds of mesh and matrices over n, of a factorisation over n^1.5, of a
-# solution over n^(4/3), and of products with the matrices over n; bytes of factors over n^(4/3).
-BUILD, FACTOR, SOLUTION, PRODUCT = 3e-5, 1e-7, 3e-8, 6e-7
-COMPLEX_FACTOR, REAL_FACTOR = 700.0, 450.0
-DRIVEN, DRIVEN_PATH = 2e-9, 100  # s of a line and two reduced coordinates; positions of the path
-MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
+SOURCES = {
+    "reduction": "Z. Bai, Y. Su: Dimension reduction of large-scale second-order dynamical systems "
+    "via a second-order Arnoldi method. SIAM Journal on Scientific Computing 26 (2005) 1692-1709",
+    "Arnoldi": "D. Lu, Y. Su, Z. Bai: Stability analysis of the two-level orthogonal Arnoldi "
+    "procedure. SIAM Journal on Matrix Analysis and Applications 37 (2016) 195-214",
+    "Newmark": "N. M. Newmark: A method of computation for structural dynamics. Journal of the "
+    "Engineering Mechanics Division 85 (1959) 67-94",
+    "macroelements": "R. Stenberg: Analysis of mixed finite element methods for the Stokes "
+    "problem: a unified approach. Mathematics of Computation 42 (1984) 9-23",
+}
 
 
 @lru_cache(maxsize=64)
@@ -88,7 +58,8 @@ def mesh_limits(body: Body, h: float | None = None) -> tuple[Limit, ...]:
     except ValueError as error:
         why = str(error).rpartition("; ")[0]  # without its own cure
         is_too_fine = isinstance(error, MeshError)  # else elements do not follow the layers
-        cure, change = _coarser(body) if is_too_fine else ('set kind = "slab"', _as_slab)
+        as_slab = of_body(kind="slab", relief=PLAIN, bone=PHALANX, regions=())
+        cure, change = _coarser(body) if is_too_fine else ('set kind = "slab"', as_slab)
     else:
         return ()
     return (Limit(why=f"cannot mesh this body: {why}", cure=cure, change=change),)
@@ -96,21 +67,21 @@ def mesh_limits(body: Body, h: float | None = None) -> tuple[Limit, ...]:
 
 def _with_finite_depth(scene: Scene) -> Scene:
     below = max(0.0, *scene.depths, *scene.body.interfaces[:-1])
-    return of_body(depth=below + FINITE)(scene)
+    return of_body(depth=finite_depth(below))(scene)
 
 
-def _as_slab(scene: Scene) -> Scene:
-    """Return the scene on a slab of the same size and layers."""
-    return of_body(kind="slab", relief=PLAIN, bone=PHALANX, regions=())(scene)
+def finite_depth(below: float, more: float = 15e-3) -> float:
+    """Return the depth in m to mesh of a half-space, given that of its lowest layer or probe."""
+    return below + more
 
 
 def _coarser(body: Body) -> tuple[str, Callable[[Scene], Scene] | None]:
     """Return the change to a thicker body or a shorter sheet, with fewer elements."""
     if body.of_kind.is_plate:
-        longest = MOST_SLENDER * min(body.width, body.height)
+        longest = 10 * min(body.width, body.height)  # default elements can mesh this ratio
         sides = {"width": min(body.width, longest), "height": min(body.height, longest)}
         return f"make it at most {1e3 * longest:g} mm long", of_body(**sides)
-    for depth in (body.depth * THICKER ** np.arange(1, 40)).tolist():
+    for depth in (body.depth * 1.25 ** np.arange(1, 40)).tolist():
         thickness = significant(1e3 * depth, 2)
         thicker = replace(body, depth=float(thickness) / 1e3)
         try:
@@ -134,14 +105,15 @@ def _limits(
         )
 
 
-def _solve_reduced(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    return answer(prepare(scene, options), scene, options.progress, times=times)
+def time_step(scene: Scene, options: SolveOptions, rate: float = 20_000.0) -> float:
+    """Return the step in s of a time integration, by default with an error of 0.3 % at 600 Hz."""
+    return options.dt or resolving_step(scene.pressure, 1 / rate)
 
 
 def transient_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Integrate all degrees of freedom in time, in steps of dt that a cubic spline interpolates."""
     report, solver = options.progress, options.solver
-    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    dt = time_step(scene, options)
     steps = step_count(float(times[-1]), dt)
     clock, body = Clock(), relaxing(scene.body, series_tolerance(options.tolerance))
     build = meshed.mesh_body(body, options.h, clock, report)
@@ -204,6 +176,7 @@ def march(
     read: Callable[[Floats], Floats],
     stored: Callable[[fem.State], float],
     report: Progress,
+    check_every: int = 50,
 ) -> tuple[Floats, tuple[float, float]]:
     """Return readings (steps + 1, p) of the displacements (3 n,) in m of a time integration, and
     its last `energy_balance`; `stored` returns the energy in J of a state.
@@ -214,21 +187,23 @@ def march(
     for k, (state, energies) in enumerate(balanced):
         readings.append(read(state.displacement))
         report("march", k / steps)
-        if k % BALANCE_STEPS == 0 or k == steps:
+        if k % check_every == 0 or k == steps:
             when = f" at t = {state.time:g} s, step {k}"
             balance = meshed.energy_balance(energies, stored(state), when)
     return np.array(readings), balance
 
 
-def step_count(duration: float, dt: float) -> int:
-    """Return the number of steps of dt in a duration in s, or raise if beyond `MOST_STEPS`."""
+def step_count(duration: float, dt: float, most: int = 1_000_000) -> int:
+    """Return the number of steps of dt in a duration in s; raises a ValueError above `most`, five
+    times the steps of the longest Tacton.
+    """
     if dt > duration:
         raise ValueError(
             f"dt = {dt:g} s is longer than the response, {duration:g} s; use a shorter step"
         )
-    if duration / dt > MOST_STEPS:
+    if duration / dt > most:
         raise ValueError(
-            f"dt = {dt:g} s makes {duration / dt:.2g} steps, more than {MOST_STEPS:,}; use a "
+            f"dt = {dt:g} s makes {duration / dt:.2g} steps, more than {most:,}; use a "
             "longer step or a shorter duration"
         )
     return max(3, ceil(duration / dt - 1e-9))
@@ -239,8 +214,8 @@ def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respo
     without the mean if the body is unconstrained. If all probes lie on a symmetry plane of the
     body, only one half is modelled.
     """
-    report, solver = options.progress, options.solver
-    threshold = options.tolerance / 50  # of the strongest line
+    report, solver, most_lines = options.progress, options.solver, 1000  # each a factorisation
+    threshold, count = _lines_solved(scene, options)
     clock, quantity = Clock(), scene.reading.record
     axes = modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
     build = meshed.mesh_body(scene.body, options.h, clock, report, axes)
@@ -251,10 +226,9 @@ def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respo
     )
     solve = fem.LineSolver(ops, solver)
     with clock("lines"):
-        lines = load_lines(scene.loads[0], threshold)
-        if (count := len(np.unique(np.round(lines.frequencies, 9)))) > MOST_LINES:
+        if count > most_lines:
             raise ValueError(
-                f"this load has {count:,} lines, more than {MOST_LINES:,}; use --model fem"
+                f"this load has {count:,} lines, more than {most_lines:,}; use --model fem"
             )
         frequencies, pressures = meshed.load_lines_at(scene.loads, points, threshold)
         if not scene.body.is_held:  # under the mean an unconstrained body would drift
@@ -288,6 +262,13 @@ def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respo
     )
     values = quantity.waveforms(components, len(scene.probes))
     return response_of(scene, "fem-harmonic", times, values, effort)
+
+
+def _lines_solved(scene: Scene, options: SolveOptions) -> tuple[float, int]:
+    """Return a threshold over the strongest line, and the number of lines of the load above it."""
+    threshold = options.tolerance / 50
+    lines = load_lines(scene.loads[0], threshold)
+    return threshold, len(np.unique(np.round(lines.frequencies, 9)))
 
 
 def _line(
@@ -326,45 +307,52 @@ def _reduced_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
         lines_below(scene, times),
         len(scene.probes) * (1 if scene.reading.record.is_normal else 6),
     )
-    driven = DRIVEN * lines * (modes + DRIVEN_PATH) * modes
-    read = SUMMED * len(times) * outputs * (lines + 2 * modes)
+    positions = 100  # of the path
+    driven = 2e-9 * lines * (modes + positions) * modes  # s of a line and two coordinates
+    read = UNITS.exponential * len(times) * outputs * (lines + 2 * modes)
     return Cost(
-        parts={MESH: sum(effort.seconds.values()), LINES: START + driven, PROBES: read},
-        memory=max(PROCESS + BYTES_PER_DOF * effort.dofs, effort.peak_memory),
+        parts={
+            Cheaper.MESH: sum(effort.seconds.values()),
+            Cheaper.LINES: UNITS.start + driven,
+            Cheaper.PROBES: read,
+        },
+        memory=max(UNITS.process + BYTES_PER_DOF * effort.dofs, effort.peak_memory),
     )
 
 
 def _line_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
-    n, lines = effort.dofs, load_lines(scene.loads[0], options.tolerance / 50)
-    count = len(np.unique(np.round(lines.frequencies, 9)))
+    n, (_, count) = effort.dofs, _lines_solved(scene, options)
     seconds, _ = synthesis(scene, computed_times(scene, options))
     return Cost(
         parts={
-            MESH: BUILD * n,
-            DURATION: seconds,
-            REDUCED: FACTOR * n**1.5 * (count + 1) + PRODUCT * n * count,
+            Cheaper.MESH: UNITS.build * n,
+            Cheaper.DURATION: seconds,
+            Cheaper.REDUCED: UNITS.factor * n**1.5 * (count + 1) + UNITS.product * n * count,
         },
-        memory=PROCESS + COMPLEX_FACTOR * n ** (4 / 3),
+        memory=UNITS.process + 700.0 * n ** (4 / 3),  # bytes of complex factors
     )
 
 
 def _stepped_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
     axes = modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
     n = effort.dofs * 2 ** len(axes)  # the whole body
-    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    steps = step_count(float(computed_times(scene, options)[-1]), dt)
     return Cost(
         parts={
-            MESH: BUILD * n + FACTOR * n**1.5,
-            REDUCED: steps * step_seconds(n),
+            Cheaper.MESH: UNITS.build * n + UNITS.factor * n**1.5,
+            Cheaper.REDUCED: planned_steps(scene, options) * step_seconds(n),
         },
-        memory=PROCESS + REAL_FACTOR * n ** (4 / 3),
+        memory=UNITS.process + 450.0 * n ** (4 / 3),  # bytes of real factors
     )
+
+
+def planned_steps(scene: Scene, options: SolveOptions) -> int:
+    """Return the number of steps of a time integration."""
+    return step_count(float(computed_times(scene, options)[-1]), time_step(scene, options))
 
 
 def step_seconds(n: float) -> float:
     """Return the seconds of a time step of n degrees of freedom: a solution, and products."""
-    return SOLUTION * n ** (4 / 3) + PRODUCT * n
+    return UNITS.solution * n ** (4 / 3) + UNITS.product * n
 
 
 FEM = register(
@@ -372,17 +360,19 @@ FEM = register(
         name="fem",
         method="10-node tetrahedra, reduced-order model",
         words="linear waves on 10-node tetrahedra by a reduced-order model",
-        solve=_solve_reduced,
+        solve=lambda scene, times, options: answer(
+            prepare(scene, options), scene, options.progress, times=times
+        ),
         default_size=default_size,
         limits=partial(_limits, held_air_limits, True),
         cost=_reduced_cost,
         colour="#0072B2",
-        sources=(REDUCTION, ARNOLDI, MACROELEMENTS),
+        sources=(SOURCES["reduction"], SOURCES["Arnoldi"], SOURCES["macroelements"]),
         is_reduced=True,
         takes_series=has_own_law,
     )
 )
-HARMONIC = register(
+register(
     replace(
         FEM,
         name="fem-harmonic",
@@ -392,13 +382,13 @@ HARMONIC = register(
         limits=partial(_limits, vacuum_limits, True),
         cost=_line_cost,
         colour="#CC79A7",
-        sources=(MACROELEMENTS,),
+        sources=(SOURCES["macroelements"],),
         from_rest="fem",
         is_reduced=False,
         takes_series=lambda body: False,
     )
 )
-TRANSIENT = register(
+register(
     replace(
         FEM,
         name="fem-transient",
@@ -408,7 +398,7 @@ TRANSIENT = register(
         limits=partial(_limits, vacuum_limits, False),
         cost=_stepped_cost,
         colour="#D55E00",
-        sources=(NEWMARK, MACROELEMENTS),
+        sources=(SOURCES["Newmark"], SOURCES["macroelements"]),
         is_reduced=False,
         is_stepped=True,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -76,6 +76,7 @@ class SolveOptions:
 
 
 DEFAULT = SolveOptions()
+Solve = Callable[[Scene, Floats, SolveOptions], Response]
 
 
 @contextmanager

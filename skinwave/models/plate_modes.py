@@ -40,54 +40,45 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.sheet import equivalent, frame_in_air
 from skinwave.bodies.supports import EDGES
 from skinwave.models import Cost, Limit, Model, named, register
-from skinwave.models.costs import (
-    DURATION,
-    LINES,
-    PROBES,
-    PROCESS,
-    START,
-    SUMMED,
-    computed_times,
-    lines_below,
-    synthesis,
-)
+from skinwave.models.costs import UNITS, Cheaper, computed_times, lines_below, synthesis
 from skinwave.models.laws import has_own_law, slowest_and_fastest
 from skinwave.models.limits import clamped_sheet_limits, of_body, surface_limits, takes
-from skinwave.models.options import SolveOptions, response_of, sample_times
+from skinwave.models.options import Solve, SolveOptions, response_of, sample_times
 from skinwave.models.relative_change import relative_changes
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, one_thread, peak_memory, silent
 from skinwave.typing import Complex, Floats
 
-PLATES = "A. W. Leissa: Vibration of Plates. NASA SP-160, 1969"
-ERROR = ErrorPart(  # of a steady waveform, by finite elements of a frame, vacuum and air
+RITZ_ERROR = ErrorPart(  # of a steady waveform, by finite elements of a frame, vacuum and air
     name="modes", source="Ritz's method", error=0.01, cure="use a larger tolerance"
 )
-# Error of a thin plate over the effect of shear and rotary inertia: 0.6 to 1.3 for plates of 0.04
-# to 0.2 times their side, simply supported or clamped, by finite elements; 2.0 near a clamped edge.
-CLAMPED = 2.0
-DETUNING = 1e-3  # of natural frequencies, for the sensitivity
-KARMAN = (
-    "S. Bilbao, O. Thomas, C. Touze, M. Ducceschi: Conservative numerical methods for the full von "
-    "Karman plate equations. Numerical Methods for Partial Differential Equations 31 (2015) "
-    "1948-1970. doi 10.1002/num.21974"
-)
-LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
-COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number compared with the one before
-FIRST_DURATION = 0.2  # s of a response, at least, that decides whether a sheet stretches
-NEGLIGIBLE_LINE = 1e-4  # of the strongest: weaker lines do not change the sensitivity
-NEGLIGIBLE_MODE = 1e-4  # of the mode that moves most: weaker modes do not show on a map
-SHARE = 0.6  # of the tolerance, for the error of steps and modes
-# Error over the change by fewer modes: 0.2 to 1.7, because modes converge slowly near a resonance.
-TRUNCATION = 2.0
-EXTRAPOLATED = 0.5  # of the error of the steps, left by extrapolation: 0.02 to 0.3
-LEAST_RATIO = 1.5  # of two lengths of steps that are extrapolated
-# Seconds of two modes of one symmetry, in the modes, and in a line with tension; of a line and a
-# mode. Seconds and bytes of the states of stress; seconds of a time step at large deflection, with
-# all its repetitions; bytes of a sample, a probe and a mode, and of a step.
-OF_MODES, COUPLED_LINE, MODAL_FORCE = 1.4e-6, 3e-9, 1e-7
-OF_STATES, STRETCHED_STEP, OF_SUM, OF_STEP = (1.0, 2e7), 1.6e-4, 0.7, 6e3
-DEGREE = 5  # of the splines that are differentiated
+
+
+@dataclass(frozen=True, kw_only=True)
+class StretchingAccuracy:
+    """Time steps and modes with which stretching is computed, and the estimate of their error.
+
+    Time steps last from `shortest` to `longest` s. Splines of this `degree` interpolate between
+    them. Each of the `counts` of modes is compared with the one before. Steps and modes may use a
+    `share` of the tolerance.
+
+    The error of modes is `truncation` times the change by fewer modes: 0.2 to 1.7 times it was
+    measured, because modes converge slowly near a resonance. Extrapolation from steps whose lengths
+    have the ratio `least_ratio` or more leaves `extrapolated` of the error of the steps; 0.02 to
+    0.3 of it was measured.
+    """
+
+    longest: float = 1e-4
+    shortest: float = 2.5e-5
+    degree: int = 5
+    counts: tuple[int, ...] = (42, 60, 86, 120)
+    share: float = 0.6
+    truncation: float = 2.0
+    extrapolated: float = 0.5
+    least_ratio: float = 1.5
+
+
+ACCURACY = StretchingAccuracy()
 
 
 def plate_of(body: Body) -> Plate:
@@ -141,11 +132,20 @@ class Driven:
     outputs: Floats
 
 
-@one_thread()
-def steady_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """Solve the steady state of the modes for all lines below half the sampling rate."""
-    started, driven = time.perf_counter(), _drive(scene, times, options.progress)
-    return _response(scene, times, MODES.name, driven, _steady(scene, driven, times), started)
+def _solver(model: str, motion: Callable[[Scene, Driven, Floats], Floats]) -> Solve:
+    """Return the function of a model that solves its `motion` (t, p) of the driven modes."""
+
+    @one_thread()
+    def solve(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+        started, driven = time.perf_counter(), _drive(scene, times, options.progress)
+        values = motion(scene, driven, times)
+        effort = Effort(
+            seconds={"evaluate": time.perf_counter() - started}, dofs=len(driven.modes.squared),
+            steps=len(driven.frequencies), peak_memory=peak_memory(),
+        )  # fmt: skip
+        return response_of(scene, model, times, values, effort)
+
+    return solve
 
 
 @one_thread()
@@ -162,14 +162,6 @@ def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Co
 
 
 @one_thread()
-def answer_from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """Solve the steady state and the free vibration after a start from rest."""
-    started, driven = time.perf_counter(), _drive(scene, times, options.progress)
-    values = _from_rest(scene, driven, times)
-    return _response(scene, times, FROM_REST.name, driven, values, started)
-
-
-@one_thread()
 def thin_plate_part(scene: Scene) -> ErrorPart:
     """Return the part of the error that is due to shear and rotary inertia.
 
@@ -178,73 +170,66 @@ def thin_plate_part(scene: Scene) -> ErrorPart:
     """
     times = sample_times(scene)
     first = len(first_part(scene, times))
-    error = CLAMPED * effect_of(_shear_and_inertia, scene, first) * len(times) / first
-    if error > ERROR.error and first < len(times):
-        error = CLAMPED * effect_of(_shear_and_inertia, scene, len(times))
-    return without_shear(scene, error)
+    error = _thickness_error(scene, scene.body.depth, first) * len(times) / first
+    if error > RITZ_ERROR.error and first < len(times):
+        error = _thickness_error(scene, scene.body.depth, len(times))
+    return shear_part(scene, error)
 
 
 def thick_mesh_part(scene: Scene) -> Iterator[ErrorPart]:
     """Yield the part due to the shear and rotary inertia that a mesh has because it is thicker
     than its sheet.
     """
-    if equivalent(scene.body) <= scene.body.depth or not takes(FROM_REST, scene):
+    thickness = equivalent(scene.body)
+    if thickness <= scene.body.depth or not takes(FROM_REST, scene):
         return
-    error = CLAMPED * effect_of(_thick_mesh, scene, len(sample_times(scene)))
-    source = f"the mesh, {1e3 * equivalent(scene.body):.2g} mm thick for the same bending"
+    error = _thickness_error(scene, thickness, len(sample_times(scene)))
+    source = f"the mesh, {1e3 * thickness:.2g} mm thick for the same bending"
     yield ErrorPart(
         name="thick mesh", source=source, error=error, cure=f"use --model {FROM_REST.name}"
     )
 
 
-def without_shear(scene: Scene, error: float) -> ErrorPart:
-    """Return the part of the error of a thin plate."""
+def shear_part(scene: Scene, error: float) -> ErrorPart:
+    """Return the part of the error of a thin plate from its size."""
     cure = "use --model fem" if takes(named("fem"), scene) else "use a thinner sheet"
     source = "shear and rotary inertia, which a thin plate leaves out"
     return ErrorPart(name="thin plate", source=source, error=error, cure=cure)
 
 
 @one_thread()
-def sensitivity(scene: Scene) -> float:
+def sensitivity(scene: Scene, by: float = 1e-3) -> float:
     """Return the relative change of the waveforms per relative change of natural frequencies."""
-    return effect_of(_detuned, scene, len(sample_times(scene))) / DETUNING
+    return _effect_of(scene, len(sample_times(scene)), detuning=by) / by
 
 
-Factors = tuple[Floats | float, Floats | float]  # of the stiffness of bending and of modal mass
+def _thickness_error(scene: Scene, thickness: float, samples: int) -> float:
+    """Return the error of a thin plate due to the shear and rotary inertia of a `thickness` in m.
+
+    It is 0.6 to 1.3 times their effect on plates of 0.04 to 0.2 times their side, simply supported
+    or clamped, by finite elements, and 2.0 times near a clamped edge.
+    """
+    return 2.0 * _effect_of(scene, samples, thickness=thickness)
 
 
 @lru_cache(maxsize=64)
-def effect_of(change: Callable[[Body, PlateModes], Factors], scene: Scene, samples: int) -> float:
-    """Return the relative change of the first samples from rest with other modes, without coupling.
-
-    `change` returns the factors (m,) of a body's modes.
+def _effect_of(
+    scene: Scene, samples: int, *, thickness: float = 0.0, detuning: float = 0.0
+) -> float:
+    """Return the relative change of the first samples from rest, without coupling between modes, by
+    the shear and rotary inertia of a thickness in m and by a detuning of natural frequencies.
     """
     times, (driven, values) = sample_times(scene)[:samples], _uncoupled(scene, samples)
-    count = len(driven.modes.squared)
-    bending, mass = (np.broadcast_to(f, count) for f in change(scene.body, driven.modes))
-    modes = scaled_modes(driven.modes, bending=bending, mass=mass)
-    forces, outputs = (each / np.sqrt(mass) for each in (driven.forces, driven.outputs))
-    other = _apart(replace(driven, modes=modes, forces=forces, outputs=outputs), scene.body)
-    changed = _from_rest(scene, other, times)
-    return float(relative_changes(changed - values, changed).max())
-
-
-def _shear_and_inertia(body: Body, modes: PlateModes) -> Factors:
-    return _of_thickness(body, modes, body.depth)
-
-
-def _thick_mesh(body: Body, modes: PlateModes) -> Factors:
-    return _of_thickness(body, modes, equivalent(body))
-
-
-def _of_thickness(body: Body, modes: PlateModes, thickness: float) -> Factors:
+    modes, body = driven.modes, scene.body
     bent = np.maximum(modes.squared * modes.elastic, 0.0)
     k = np.asarray((bent * body.mass_per_area / body.bending_stiffness) ** 0.25)
-    return thick_plate(k * thickness, body.solid.poisson)
-
-
-def _detuned(body: Body, modes: PlateModes) -> Factors:
-    return 1.0, (1 + DETUNING) ** -2
+    bending, mass = thick_plate(k * thickness, body.solid.poisson)
+    mass = mass * (1 + detuning) ** -2
+    modes = scaled_modes(modes, bending=bending, mass=mass)
+    forces, outputs = (each / np.sqrt(mass) for each in (driven.forces, driven.outputs))
+    other = _apart(replace(driven, modes=modes, forces=forces, outputs=outputs), body)
+    changed = _from_rest(scene, other, times)
+    return float(relative_changes(changed - values, changed).max())
 
 
 @lru_cache(maxsize=2)
@@ -255,7 +240,7 @@ def _uncoupled(scene: Scene, samples: int) -> tuple[Driven, Floats]:
     times = sample_times(scene)[:samples]
     driven = _drive(scene, times)
     sizes = np.linalg.norm(driven.motion, axis=1)
-    strong = sizes > NEGLIGIBLE_LINE * sizes.max(initial=0.0)
+    strong = sizes > 1e-4 * sizes.max(initial=0.0)  # weaker lines do not change the sensitivity
     driven = replace(driven, frequencies=driven.frequencies[strong], forces=driven.forces[strong])
     driven = _apart(driven, scene.body)
     return driven, _from_rest(scene, driven, times)
@@ -278,21 +263,6 @@ def _drive(scene: Scene, times: Floats, progress: Progress = silent) -> Driven:
     return Driven(modes=modes, outputs=modes.at(scene.probe_points - (x, y)), **vars(driven))
 
 
-def _response(
-    scene: Scene, times: Floats, model: str, driven: Driven, values: Floats, started: float
-) -> Response:
-    effort = Effort(
-        seconds={"evaluate": time.perf_counter() - started}, dofs=len(driven.modes.squared),
-        steps=len(driven.frequencies), peak_memory=peak_memory(),
-    )  # fmt: skip
-    return response_of(scene, model, times, values, effort)
-
-
-def _from_rest(scene: Scene, driven: Driven, times: Floats) -> Floats:
-    """Return the motion from rest (t, p)."""
-    return _steady(scene, driven, times) + _free_vibration(scene, driven, times)
-
-
 def _steady(scene: Scene, driven: Driven, times: Floats) -> Floats:
     """Return the steady state (t, p)."""
     below = below_half_the_rate(driven.frequencies, times)
@@ -305,13 +275,14 @@ def _amplitudes(scene: Scene, driven: Driven) -> Complex:
     return np.asarray(driven.motion @ driven.outputs.T * rates)
 
 
-def _free_vibration(scene: Scene, driven: Driven, times: Floats) -> Floats:
-    """Return the free vibration (t, p) after the state of rest before t = 0."""
+def _from_rest(scene: Scene, driven: Driven, times: Floats) -> Floats:
+    """Return the motion (t, p) from rest before t = 0: the steady state and the free vibration."""
     vibrates = driven.start != 0
     rates = driven.poles[vibrates]
     outputs = np.broadcast_to(driven.outputs.T[:, None], (*vibrates.shape, len(driven.outputs)))
     amplitudes = driven.start[vibrates] * scene.reading.record.factor(rates)
-    return exponential_sum(rates, amplitudes[:, None] * outputs[vibrates], times)
+    free = exponential_sum(rates, amplitudes[:, None] * outputs[vibrates], times)
+    return _steady(scene, driven, times) + free
 
 
 def limits(scene: Scene) -> Iterator[Limit]:
@@ -337,14 +308,18 @@ def _cost(from_rest: bool, scene: Scene, options: SolveOptions, effort: Effort) 
     coupled = any(family.bending is not None or family.air for family in modes.families)
     seconds, size = synthesis(scene, times)
     summed = len(times) * len(scene.probes) * int(sizes.sum()) if from_rest else 0
+    # Seconds of two modes of one symmetry, in the modes, and in a line with tension; of a line and
+    # a mode; bytes of a sample, a probe and a mode.
+    pair, pair_in_line, mode_in_line, value = 1.4e-6, 3e-9, 1e-7, 0.7
+    driven = pair_in_line * pairs * coupled + mode_in_line * int(sizes.sum())
     return Cost(
         parts={
-            "use a smaller sheet": START + OF_MODES * pairs,
-            LINES: lines * (COUPLED_LINE * pairs * coupled + MODAL_FORCE * int(sizes.sum())),
-            PROBES: SUMMED * summed,
-            DURATION: seconds,
+            "use a smaller sheet": UNITS.start + pair * pairs,
+            Cheaper.LINES: lines * driven,
+            Cheaper.PROBES: UNITS.exponential * summed,
+            Cheaper.DURATION: seconds,
         },
-        memory=PROCESS + size + OF_SUM * summed,
+        memory=UNITS.process + size + value * summed,
     )
 
 
@@ -353,12 +328,12 @@ MODES = register(
         name="plate-modes",
         method="modes of a thin plate by Ritz's method, line by line",
         words="the steady state of a thin plate, in its modes by Ritz's method",
-        solve=steady_answer,
+        solve=_solver("plate-modes", _steady),
         limits=limits,
-        parts=lambda scene, options: [ERROR, thin_plate_part(scene)],
+        parts=lambda scene, options: [RITZ_ERROR, thin_plate_part(scene)],
         cost=partial(_cost, False),
         colour="#F0E442",
-        sources=(PLATES,),
+        sources=("A. W. Leissa: Vibration of Plates. NASA SP-160, 1969",),
         from_rest="plate-modes-transient",
     )
 )
@@ -368,7 +343,7 @@ FROM_REST = register(
         name="plate-modes-transient",
         from_rest="",
         takes_series=has_own_law,
-        solve=answer_from_rest,
+        solve=_solver("plate-modes-transient", _from_rest),
         cost=partial(_cost, True),
         method="modes of a thin plate by Ritz's method, from rest",
         words="a thin plate from rest, in its modes by Ritz's method",
@@ -383,32 +358,31 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
     started = time.perf_counter()
     modes: PlateModes = modes_of(plate_of(scene.body))
     options.progress("large deflection", 0.0)
-    found = stretched(scene, len(times), step(times), options.tolerance, options.dt)
+    found = solve_stretching(scene, len(times), step(times), options.tolerance, options.dt)
     used = found.runs[0][1]
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
         reduced_dofs=used.count, steps=used.steps,
         dt=float(times[-1]) / used.steps, peak_memory=peak_memory(),
         errors=Statement(
-            parts=(ERROR, thin_plate_part(scene), found.error), tolerance=options.tolerance
+            parts=(RITZ_ERROR, thin_plate_part(scene), found.error), tolerance=options.tolerance
         ),
     )  # fmt: skip
     return response_of(scene, STRETCHED.name, times, found.linear + found.values, effort)
 
 
-def first_part(scene: Scene, times: Floats) -> Floats:
-    """Return the times (s,) in s for which steps and modes are chosen."""
+def first_part(scene: Scene, times: Floats, least: float = 0.2) -> Floats:
+    """Return the times (s,) in s, for `least` s or more, that decide whether a sheet stretches."""
     slowest, _ = slowest_and_fastest(scene.pressure)
-    return times[: max(2, round(max(FIRST_DURATION, 1 / slowest) / step(times)) + 1)]
+    return times[: max(2, round(max(least, 1 / slowest) / step(times)) + 1)]
 
 
 @one_thread()
 def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
     """Return the largest relative error of a linear response (t, p) from rest."""
-    count = min(COUNTS[0], len(modes_of(plate_of(scene.body)).squared))
-    stretching = added_by_stretching(
-        scene, times, Run(count=count, steps=_step_count(times, LONGEST))
-    )
+    count = min(ACCURACY.counts[0], len(modes_of(plate_of(scene.body)).squared))
+    run = Run(count=count, steps=_step_count(times, ACCURACY.longest))
+    stretching = stretching_in_run(scene, times, run)
     return float(relative_changes(stretching, linear + stretching).max())
 
 
@@ -420,14 +394,15 @@ def sheet_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, Callab
     """
     times, body, pressure = sample_times(scene), scene.body, scene.pressure
     middle, modes = body.placement.offset, modes_of(plate_of(body))
-    found, driven = stretched(scene, len(times), step(times), tolerance, None), _drive(scene, times)
+    found = solve_stretching(scene, len(times), step(times), tolerance, None)
     driving = highest_driving(pressure, times)
     stretching = [
         (weight, *_coordinates(pressure, body, float(times[-1]), run, driving))
         for weight, run in found.runs
     ]
-    sizes, chosen = np.linalg.norm(driven.motion, axis=0), [p.chosen for _, p, _ in stretching]
-    moving = np.union1d(np.flatnonzero(sizes > NEGLIGIBLE_MODE * sizes.max()), np.hstack(chosen))
+    sizes = np.linalg.norm(_drive(scene, times).motion, axis=0)
+    shown = np.flatnonzero(sizes > 1e-4 * sizes.max())  # weaker modes do not show on a map
+    moving = np.union1d(shown, np.hstack([plate.chosen for _, plate, _ in stretching]))
     z = linear_motion(
         modes, pressure, body.solid, times, middle=middle, chosen=moving,
         driving=driving, highest=0.5 / step(times),
@@ -458,8 +433,9 @@ class Stretching:
 
 
 @lru_cache(maxsize=1)  # a response and a map of the same motion
-def stretched(
-    scene: Scene, samples: int, sample: float, tolerance: float, dt: float | None
+def solve_stretching(
+    scene: Scene, samples: int, sample: float, tolerance: float, dt: float | None,
+    own: StretchingAccuracy = ACCURACY,
 ) -> Stretching:  # fmt: skip
     """Return what stretching adds at every `sample` in s, within the tolerance if possible.
 
@@ -469,11 +445,11 @@ def stretched(
     """
     times: Floats = sample * np.arange(samples, dtype=np.float64)
     linear = FROM_REST.solve(scene, times, SolveOptions(tolerance=tolerance, dt=dt)).values
-    allowed, most = SHARE * tolerance, len(modes_of(plate_of(scene.body)).squared)
-    counts = [min(count, most) for count in COUNTS]
-    first, base = counts[0], _step_count(times, dt or LONGEST)
-    finest = base if dt else max(base, _step_count(times, SHORTEST))
-    values = lru_cache(partial(added_by_stretching, scene, times))
+    allowed, most = own.share * tolerance, len(modes_of(plate_of(scene.body)).squared)
+    counts = [min(count, most) for count in own.counts]
+    first, base = counts[0], _step_count(times, dt or own.longest)
+    finest = base if dt else max(base, _step_count(times, own.shortest))
+    values = lru_cache(partial(stretching_in_run, scene, times))
 
     def change(run: Run, other: Run) -> float:
         found = values(run)
@@ -482,15 +458,16 @@ def stretched(
     def by_steps(count: int, steps: int, fewer: int) -> float:
         """Return what extrapolation leaves of the error of the steps, which is of second order."""
         run, other = (Run(count=count, steps=n) for n in (steps, fewer))
-        return EXTRAPOLATED * change(run, other) / ((steps / fewer) ** 2 - 1)
+        return own.extrapolated * change(run, other) / ((steps / fewer) ** 2 - 1)
 
     steps, fewer = base, ceil(base / 2)
     while (left := by_steps(first, steps, fewer)) > allowed / 2 and steps < finest:
-        ratio = max(LEAST_RATIO, sqrt(left / (allowed / 2)))
+        ratio = max(own.least_ratio, sqrt(left / (allowed / 2)))
         shorter = min(ceil(ratio * steps), finest)
-        steps, fewer = shorter, min(steps, int(shorter / LEAST_RATIO))
+        steps, fewer = shorter, min(steps, int(shorter / own.least_ratio))
     for less, count in pairwise(counts):
-        by_modes = TRUNCATION * change(Run(count=count, steps=base), Run(count=less, steps=base))
+        more_modes, fewer_modes = (Run(count=n, steps=base) for n in (count, less))
+        by_modes = own.truncation * change(more_modes, fewer_modes)
         if by_modes + left <= allowed:
             break
     same = first if steps == base else count  # without shorter steps, the fewest modes suffice
@@ -514,7 +491,7 @@ def _step_count(times: Floats, longest: float) -> int:
     """Return the number of equal steps that end at the last of times (t,) in s. Twice as long ones
     are enough for a spline.
     """
-    return max(2 * DEGREE, ceil(times[-1] / longest - 1e-6))
+    return max(2 * ACCURACY.degree, ceil(times[-1] / longest - 1e-6))
 
 
 def steps_part(source: str, error: float, more: str = "") -> ErrorPart:
@@ -527,11 +504,11 @@ def _planned_parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
     """Yield the parts of a sheet that stretches, with the error at which steps and modes suffice,
     which the response replaces by its own.
     """
-    yield from (ERROR, thin_plate_part(scene))
-    yield steps_part("modes that stretch, in time steps", SHARE * options.tolerance)
+    yield from (RITZ_ERROR, thin_plate_part(scene))
+    yield steps_part("modes that stretch, in time steps", ACCURACY.share * options.tolerance)
 
 
-def added_by_stretching(scene: Scene, times: Floats, run: Run) -> Floats:
+def stretching_in_run(scene: Scene, times: Floats, run: Run) -> Floats:
     """Return what stretching adds to the quantity (t, p)."""
     driving = highest_driving(scene.pressure, times)
     plate, coordinates = _coordinates(scene.pressure, scene.body, float(times[-1]), run, driving)
@@ -548,7 +525,7 @@ def _at(values: Floats, times: Floats, rate: int = 0) -> Floats:
     from scipy.interpolate import make_interp_spline  # slow to import
 
     steps = np.linspace(0.0, times[-1], len(values))
-    return np.asarray(make_interp_spline(steps, values, DEGREE)(times, rate))
+    return np.asarray(make_interp_spline(steps, values, ACCURACY.degree)(times, rate))
 
 
 @lru_cache(maxsize=4)  # the response, the map and the picture of a sheet need the same ones
@@ -572,15 +549,16 @@ def _coordinates(
 def _stretched_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
     """Return the cost of the linear motion, solved twice, and of the steps with stretching."""
     linear, times = _cost(True, scene, options, effort), computed_times(scene, options)
-    parts = ceil(step(times) / (options.dt or LONGEST) - 1e-9)
+    parts = ceil(step(times) / (options.dt or ACCURACY.longest) - 1e-9)
     steps = (len(times) + len(first_part(scene, times))) * parts
+    # Seconds and bytes of the states of stress, and of a time step with all its repetitions.
     return Cost(
         parts={
             **linear.parts,
-            LINES: 2 * linear.parts[LINES],
-            DURATION: OF_STATES[0] + STRETCHED_STEP * steps,
+            Cheaper.LINES: 2 * linear.parts[Cheaper.LINES],
+            Cheaper.DURATION: 1.0 + 1.6e-4 * steps,
         },
-        memory=linear.memory + OF_STATES[1] + OF_STEP * steps,
+        memory=linear.memory + 2e7 + 6e3 * steps,
     )
 
 
@@ -594,7 +572,12 @@ STRETCHED = register(
         parts=_planned_parts,
         cost=_stretched_cost,
         colour="#4D4D9F",
-        sources=(PLATES, KARMAN),
+        sources=(
+            *FROM_REST.sources,
+            "S. Bilbao, O. Thomas, C. Touze, M. Ducceschi: Conservative numerical methods for the "
+            "full von Karman plate equations. Numerical Methods for Partial Differential Equations "
+            "31 (2015) 1948-1970. doi 10.1002/num.21974",
+        ),
         is_nonlinear=True,
     )
 )

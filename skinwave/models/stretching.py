@@ -26,19 +26,17 @@ from fem.memory import BYTES_PER_DOF
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from meshes import middle_plane
 from simple_model import Effort, ErrorPart, Material, Response, Statement
-from simple_model.load.sampling import below_half_the_rate, highest_driving, resolving_step
+from simple_model.load.sampling import below_half_the_rate, highest_driving
 from simple_model.load.spectrum import load_lines
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.models import Cost, Limit, Model, limits, linear_elements, reduced, register
-from skinwave.models.costs import DURATION, MESH, MODES, PROCESS, computed_times, lines_below
+from skinwave.models.costs import UNITS, Cheaper, computed_times, lines_below
 from skinwave.models.laws import has_own_law
-from skinwave.models.linear_elements import NEWMARK, TRANSIENT_RATE
 from skinwave.models.meshed import load_in_steps, surface_load, with_cost
 from skinwave.models.options import SolveOptions, response_of, solver_name
-from skinwave.models.plate_modes import ERROR as PLATE_ERROR
-from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.plate_modes import FROM_REST, RITZ_ERROR
 from skinwave.models.reduced import ReducedBody, ReducedResponse
 from skinwave.models.relative_change import relative_changes
 from skinwave.models.sheet_probes import full_reader, modal_reader
@@ -46,30 +44,17 @@ from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Clock
 from skinwave.typing import Floats
 
-NEWTON = (
-    "T. Belytschko, W. K. Liu, B. Moran: Nonlinear Finite Elements for Continua and Structures. "
-    "Wiley, 2000"
-)
-# Thickness of the mesh over an element's side: the shear of so thick a sheet lowers frequencies by
-# as much as elements of this side raise them. With 7 elements a wavelength, 0.3 % of 5 % remain.
-STOCKY, STOUTEST = 0.48, 0.05
-FULL_CELLS, REDUCED_CELLS = 26, 32  # along the shorter side
-COARSE_ERROR, ERROR_ORDER = 0.05, 3.0  # of a waveform with FULL_CELLS; measured order 3.2
-HIGHEST_MODE = 1500.0  # Hz, of the modes in the basis
-FEWEST_MODES, MOST_MODES = 40, 160
-# Seconds of reducing a degree of freedom to a mode; of a step, of two modes in it, and of a line of
-# the load and a mode in it; bytes of a degree of freedom and a mode.
-REDUCE, MARCH, MODE_PAIR, LINE, BYTES_PER_MODE = 3.6e-6, 5e-4, 1.5e-7, 4e-9, 70.0
-# Of the full model: seconds of the forces of a degree of freedom, iterations in a step, and memory
-# over that of linear models.
-DOFS_PER_CELL, ELEMENTS, ITERATIONS, FULL_MEMORY = 36.0, 1e-6, 3, 2.0
-RATES = DISPLACEMENT, VELOCITY, ACCELERATION
 MOST_LINES = 500  # of a load that are summed in each step
 
 
-def stretching_size(body: Body, *, reduced: bool) -> float:
-    """Return the default element size in m of a sheet at large deflection."""
-    return min(body.width, body.height) / (REDUCED_CELLS if reduced else FULL_CELLS)
+def full_size(body: Body, cells: int = 26) -> float:
+    """Return the default element size in m of a sheet with `cells` along the shorter side."""
+    return min(body.width, body.height) / cells
+
+
+def reduced_size(body: Body) -> float:
+    """Return the default element size in m of a sheet that is reduced to its modes."""
+    return full_size(body, 32)
 
 
 def mesh_part(h: float, error: float) -> ErrorPart:
@@ -79,13 +64,20 @@ def mesh_part(h: float, error: float) -> ErrorPart:
 
 
 def expected_error(body: Body, h: float) -> float:
-    """Return the error of a waveform with elements of h in m, measured on a paper sheet."""
-    return min(1.0, COARSE_ERROR * (h * FULL_CELLS / min(body.width, body.height)) ** ERROR_ORDER)
+    """Return the error of a waveform with elements of h in m. On a paper sheet it was 5 % with the
+    default size, of the order 3.2.
+    """
+    return min(1.0, 0.05 * (h / full_size(body)) ** 3)
 
 
-def meshed_sheet(body: Body, h: float) -> Build:
-    """Return the mesh of the equivalent sheet, with cells of h in m and a suitable thickness."""
-    thickness = min(STOCKY * h, STOUTEST * min(body.width, body.height))
+def meshed_sheet(body: Body, h: float, stocky: float = 0.48) -> Build:
+    """Return the mesh of the equivalent sheet with cells of h in m.
+
+    Its thickness is `stocky` times h, because the shear of so thick a sheet then lowers frequencies
+    by as much as elements of this side raise them: with 7 elements a wavelength, 0.3 % of 5 %
+    remain.
+    """
+    thickness = min(stocky * h, 0.05 * min(body.width, body.height))
     return build(body, h, discretise=partial(discretise, thickness=thickness))
 
 
@@ -111,13 +103,13 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
 
 def full_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Integrate all degrees of freedom in time, from rest."""
-    clock, size = Clock(), options.h or stretching_size(scene.body, reduced=False)
+    clock, size = Clock(), options.h or full_size(scene.body)
     with clock("assemble"):
         options.progress("assemble", 0.0)
         made = meshed_sheet(scene.body, size)
         body = stretching_body(scene.body, made)
     P, points = surface_load(made)
-    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    dt = linear_elements.time_step(scene, options)
     load = load_in_steps((scene.pressure,), points, times, dt)
     stepped, straight, effort = _march(
         body, lambda t: P @ load(t), dt, times, options, clock,
@@ -149,7 +141,7 @@ class _Reduced:
 
 def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Integrate the bending modes of the sheet in time, from rest, with an exact linear part."""
-    clock, size = Clock(), options.h or stretching_size(scene.body, reduced=True)
+    clock, size = Clock(), options.h or reduced_size(scene.body)
     quantity, probes = scene.reading.record, scene.probe_points
     with clock("reduce"):
         options.progress("reduce", 0.0)
@@ -161,7 +153,7 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
 
     each = np.eye(len(sheet.modes.hz))
     rows = np.stack([(read(z) - read(-z)) / 2 for z in each], axis=1)  # without the quadratic part
-    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    dt = linear_elements.time_step(scene, options)
     force = _modal_force(scene, sheet.linear, times, dt)
     stepped, straight, effort = _march(
         sheet.modes.elastic, force, dt, times, options, clock, read=read, rows=rows
@@ -243,11 +235,11 @@ def _reduce(body: Body, h: float, solver: str) -> _Reduced:
     return _Reduced(made=made, modes=modes, linear=linear, operators=operators)
 
 
-def mode_count(body: Body) -> int:
-    """Return the number of modes below `HIGHEST_MODE`: area times k^2 / 4 pi (Weyl)."""
-    squared = bending_wavenumber(body, HIGHEST_MODE) ** 2
+def mode_count(body: Body, highest: float = 1500.0, within: tuple[int, int] = (40, 160)) -> int:
+    """Return the number of modes up to `highest` in Hz, area times k^2 / 4 pi (Weyl), in bounds."""
+    squared = bending_wavenumber(body, highest) ** 2
     count = round(body.width * body.height * squared / 4 / pi)
-    return min(max(count, FEWEST_MODES), MOST_MODES)
+    return min(max(count, within[0]), within[1])
 
 
 def _march(
@@ -278,9 +270,9 @@ def _march(
 
 def _normal_scene(scene: Scene) -> Scene:
     """Return the scene that reads normal motion with an error no smaller than its quantity's."""
-    quantity = scene.reading.record
-    rate = min(quantity.rate + (not quantity.is_normal), len(RATES) - 1)
-    return replace(scene, quantity=RATES[rate].name, depth=0.0)
+    quantity, normal = scene.reading.record, (DISPLACEMENT, VELOCITY, ACCELERATION)
+    rate = min(quantity.rate + (not quantity.is_normal), len(normal) - 1)
+    return replace(scene, quantity=normal[rate].name, depth=0.0)
 
 
 def _plate_part(
@@ -291,7 +283,7 @@ def _plate_part(
     if not limits.beyond(FROM_REST, normal):
         plate = FROM_REST.solve(normal, times, options).values
         measured = float(relative_changes(linear - plate, plate).max())
-        error = max(error, measured + PLATE_ERROR.error)
+        error = max(error, measured + RITZ_ERROR.error)
     return mesh_part(h, error)
 
 
@@ -309,65 +301,63 @@ def _limits(
         yield limits.load_limit(scene)
 
 
-def _parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
-    h = options.h or 0.0
-    yield mesh_part(h, expected_error(scene.body, h))
-
-
-def _sheet_dofs(body: Body, h: float) -> float:
+def sheet_dofs(body: Body, h: float, per_cell: float = 36.0) -> float:
     """Return the approximate number of degrees of freedom of a meshed sheet."""
-    return DOFS_PER_CELL * body.width * body.height / h**2
+    return per_cell * body.width * body.height / h**2
 
 
 def _reduced_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
-    n, r = _sheet_dofs(scene.body, options.h or REDUCED_SIZE(scene.body)), mode_count(scene.body)
-    times = computed_times(scene, options)
-    steps = _steps(scene, options)
-    step = MARCH + MODE_PAIR * r**2 + LINE * min(MOST_LINES, lines_below(scene, times)) * r
+    n, r = sheet_dofs(scene.body, options.h or reduced_size(scene.body)), mode_count(scene.body)
+    lines = min(MOST_LINES, lines_below(scene, computed_times(scene, options)))
+    # s of reducing a degree of freedom to a mode; of a step, two modes in it, a line and a mode.
+    reduction, march, pair, line = 3.6e-6, 5e-4, 1.5e-7, 4e-9
+    step = march + pair * r**2 + line * lines * r
+    steps = linear_elements.planned_steps(scene, options)
     return Cost(
-        parts={MESH: REDUCE * n * r, DURATION: steps * step},
-        memory=PROCESS + (BYTES_PER_DOF + BYTES_PER_MODE * r) * n,
+        parts={Cheaper.MESH: reduction * n * r, Cheaper.DURATION: steps * step},
+        memory=UNITS.process + (BYTES_PER_DOF + 70.0 * r) * n,
     )
 
 
 def _full_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
-    n = _sheet_dofs(scene.body, options.h or FULL_SIZE(scene.body))
-    step = ITERATIONS * (ELEMENTS * n + linear_elements.step_seconds(n))
+    n = sheet_dofs(scene.body, options.h or full_size(scene.body))
+    iterations, forces = 3, 1e-6  # in a step; s of the forces of a degree of freedom
+    step = iterations * (forces * n + linear_elements.step_seconds(n))
     return Cost(
-        parts={MODES: _steps(scene, options) * step},
-        memory=PROCESS + FULL_MEMORY * BYTES_PER_DOF * n,
+        parts={Cheaper.MODES: linear_elements.planned_steps(scene, options) * step},
+        memory=UNITS.process + 2 * BYTES_PER_DOF * n,  # twice that of linear models
     )
 
 
-def _steps(scene: Scene, options: SolveOptions) -> int:
-    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    return linear_elements.step_count(float(computed_times(scene, options)[-1]), dt)
-
-
-REDUCED_SIZE, FULL_SIZE = (partial(stretching_size, reduced=reduced) for reduced in (True, False))
 REDUCED = register(
     Model(
         name="fem-nonlinear",
         method="large deflection, step by step from rest",
         words="a sheet that stretches as it bends, in its modes, from rest",
         solve=reduced_answer,
-        limits=partial(_limits, limits.held_air_limits, REDUCED_SIZE),
-        parts=_parts,
+        limits=partial(_limits, limits.held_air_limits, reduced_size),
+        parts=lambda scene, options: [
+            mesh_part(options.h or 0.0, expected_error(scene.body, options.h or 0.0))
+        ],
         cost=_reduced_cost,
-        default_size=REDUCED_SIZE,
-        sources=(NEWMARK, NEWTON),
+        default_size=reduced_size,
+        sources=(
+            linear_elements.SOURCES["Newmark"],
+            "T. Belytschko, W. K. Liu, B. Moran: Nonlinear Finite Elements for Continua and "
+            "Structures. Wiley, 2000",
+        ),
         is_nonlinear=True,
         takes_series=has_own_law,
     )
 )
-FULL = register(
+register(
     replace(
         REDUCED,
         name="fem-nonlinear-transient",
         words="a sheet that stretches as it bends, on 10-node tetrahedra, step by step",
         solve=full_answer,
-        limits=partial(_limits, limits.vacuum_limits, FULL_SIZE),
+        limits=partial(_limits, limits.vacuum_limits, full_size),
         cost=_full_cost,
-        default_size=FULL_SIZE,
+        default_size=full_size,
     )
 )

@@ -10,14 +10,13 @@ import numpy as np
 import fem
 from simple_model import Effort, ErrorPart, Statement
 from simple_model.layers.flat_body import TRANSFORM_RATE
-from simple_model.load.sampling import resolving_step
 from simple_model.numbers import change_text, percent, significant
 from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Limit, Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.laws import check_laws, own_laws, series_tolerance
 from skinwave.models.limits import beyond, check_takes, default_model, refusal, takers, takes
-from skinwave.models.linear_elements import FEM, TRANSIENT_RATE, step_count
+from skinwave.models.linear_elements import FEM, step_count, time_step
 from skinwave.models.options import (
     DEFAULT,
     SolveOptions,
@@ -25,7 +24,7 @@ from skinwave.models.options import (
     sample_times,
     underflow_to_zero,
 )
-from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED, thin_plate_part
+from skinwave.models.plate_modes import FROM_REST, RITZ_ERROR, STRETCHED, thin_plate_part
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import answer, prepare
 from skinwave.planning import errors, estimates, left_out
@@ -255,7 +254,7 @@ def _why_elements(scene: Scene) -> str:
     if limits := beyond(FLAT_BODY, scene):
         return f"{FLAT_BODY.name} {limits[0].why}"
     body, reflections = scene.body, _reflections(scene)
-    if takes(FROM_REST, scene) and (thin := thin_plate_part(scene).error) > ERROR.error:
+    if takes(FROM_REST, scene) and (thin := thin_plate_part(scene).error) > RITZ_ERROR.error:
         return f"shear and rotary inertia change the motion of this sheet by {change_text(thin)}"
     if body.sides == "absorbing":
         return "absorbing sides of a sheet reflect in part"
@@ -363,7 +362,7 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
     start = left_out.start_error(scene, model, request.grid, mesh.prepared)
     parts += errors.start_parts(model, start)
     if model.is_stepped:
-        parts.append(_step_part(scene, options.dt))
+        parts.append(_step_part(scene, time_step(scene, options)))
     planned = Plan(
         model=model.name, body=body, symmetry=axes, h=mesh.h, highest=highest,
         prepared=mesh.prepared,
@@ -394,9 +393,8 @@ def rest_of(tolerance: float, error: float) -> float:
     return max(tolerance**2 - error**2, tolerance**2 / 4) ** 0.5
 
 
-def _step_part(scene: Scene, dt: float | None) -> ErrorPart:
-    """Return the error of a time step of average acceleration."""
-    step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+def _step_part(scene: Scene, step: float) -> ErrorPart:
+    """Return the error of a time `step` in s of average acceleration."""
     value, frequency = left_out.sensitivity(scene)
     # Frequencies are lower by (w dt)^2 / 12 (Hughes 1987, chapter 9).
     error = min(1.0, value * (2 * np.pi * frequency * step) ** 2 / 12)

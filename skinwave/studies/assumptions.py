@@ -25,7 +25,7 @@ from skinwave.bodies.sizes import default_size
 from skinwave.models import point_kernel
 from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.limits import takes
-from skinwave.models.linear_elements import FINITE
+from skinwave.models.linear_elements import finite_depth
 from skinwave.models.plate_modes import STRETCHED
 from skinwave.planning.estimates import response_spectrum
 from skinwave.planning.plan import model_with_sides
@@ -202,7 +202,7 @@ def check_rate(update_rate: float) -> None:
 def _body(scene: Scene, dropped: Collection[str], h: float | None) -> Body:
     body, w = scene.body, 2 * np.pi * strongest_line(scene, h)
     if body.depth == np.inf:  # elements need the part of a half-space around the focus
-        depth = body.interfaces[-2] + FINITE
+        depth = finite_depth(body.interfaces[-2])
         body = replace(body, depth=depth, base="absorbing", sides="absorbing")
     if body.of_kind.is_plate and "alike in all directions" not in dropped:
         body = isotropic_sheet(body)

@@ -13,7 +13,7 @@ from skinwave.bodies.build import build
 from skinwave.models import BUILT_IN, named
 from skinwave.models.costs import lines_below
 from skinwave.models.options import SolveOptions, sample_times
-from skinwave.models.stretching import DOFS_PER_CELL, meshed_sheet
+from skinwave.models.stretching import meshed_sheet, sheet_dofs
 from skinwave.planning.rows import cost_row
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import BODIES, Body
@@ -52,8 +52,7 @@ def test_the_counted_lines_are_those_that_are_solved(model, scene):
 @pytest.mark.parametrize("h", [4e-3, 2e-3])
 def test_the_counted_degrees_of_freedom_of_a_sheet_are_those_of_its_mesh(h):
     made = meshed_sheet(SHEET.body, h)
-    cells = SHEET.body.width * SHEET.body.height / h**2
-    assert DOFS_PER_CELL * cells == pytest.approx(int((~made.constraints).sum()), rel=0.2)
+    assert sheet_dofs(SHEET.body, h) == pytest.approx(int((~made.constraints).sum()), rel=0.2)
 
 
 def test_a_long_response_names_what_shortens_it():
