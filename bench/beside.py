@@ -28,7 +28,7 @@ import meshes
 from bench.codes import CODES, Assembled, Problem
 from skinwave.bodies.build import build
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.scene import paper15
 from skinwave.scene.scene import PROBES, Body
 from skinwave.verify import statics
@@ -66,7 +66,7 @@ def waves() -> None:
         "probes": fem.probe_operator(mesh, PROBES),
     }
     started = time.perf_counter()
-    prepared = prepare(scene, SolveOptions(h=SIZE))
+    prepared = reduce_scene(scene, SolveOptions(h=SIZE))
     ready = time.perf_counter()
     answer(prepared, scene)
     one = time.perf_counter() - started

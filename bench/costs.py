@@ -21,7 +21,7 @@ from skinwave import loads
 from skinwave.bodies.build import build
 from skinwave.models import BUILT_IN, named
 from skinwave.models.options import SolveOptions, sample_times
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import read
@@ -135,7 +135,7 @@ def measured(name: str, folder: Path, planned: dict[str, object]) -> dict[str, f
     options = replace(options, model=planned["model"], h=planned["h"])
     wall, own = time.perf_counter(), time.process_time()
     if named(options.model).is_reduced:
-        found = answer(prepare(scene, options, symmetry=planned["symmetry"]), scene)
+        found = answer(reduce_scene(scene, options, symmetry=planned["symmetry"]), scene)
     else:
         found = compute(scene, options.model, h=options.h, tolerance=options.tolerance)
     wall, own = time.perf_counter() - wall, time.process_time() - own

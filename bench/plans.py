@@ -34,7 +34,7 @@ from skinwave.bodies.sizes import default_size
 from skinwave.models import plate_modes
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.plate_modes import ACCURACY, STRETCHED, Run, sheet_motion
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.models.relative_change import relative_changes
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import about_its_rest
@@ -84,7 +84,7 @@ def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> t
     planned_scene = replace(scene, body=chosen.body)
     planned = answer(chosen.prepared, planned_scene)
     finer = SolveOptions(h=chosen.h / 2, progress=limited(SLOWEST))
-    fine = prepare(planned_scene, finer, symmetry=chosen.symmetry, reduction=REFERENCE)
+    fine = reduce_scene(planned_scene, finer, symmetry=chosen.symmetry, reduction=REFERENCE)
     better = answer(fine, planned_scene).values
     stated, true = (about_its_rest(scene, each) for each in (planned.values, better))
     own = [part for part in chosen.statement.parts if part.name in ("mesh", "reduction")]

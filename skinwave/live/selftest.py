@@ -17,7 +17,7 @@ from skinwave.models.meshed import mesh_body
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
-from skinwave.models.reduced import answer, components, prepare
+from skinwave.models.reduced import answer, components, reduce_scene
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import STILL, Body, Scene
 from skinwave.system.effort import Clock, silent
@@ -82,7 +82,7 @@ def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
         return lines_of, lambda scene: compute(scene, model).values[:, 0], ()
     size = SolveOptions(h=h or body.of_kind.interactive_size)
     places = _places_on(body)
-    prepared = prepare(Scene(pressure=STILL, body=body, probes=places), size)
+    prepared = reduce_scene(Scene(pressure=STILL, body=body, probes=places), size)
 
     def index(scene: Scene) -> int:
         return int(np.linalg.norm(np.array(places) - scene.probes[0], axis=1).argmin())

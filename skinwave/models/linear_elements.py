@@ -28,7 +28,7 @@ from skinwave.models.costs import UNITS, Cheaper, computed_times, lines_below, s
 from skinwave.models.laws import has_own_law, relaxing, series_tolerance
 from skinwave.models.limits import held_air_limits, of_body, vacuum_limits
 from skinwave.models.options import SolveOptions, response_of, solver_name
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.load import SupportMotion
 from skinwave.scene.scene import Scene
@@ -361,7 +361,7 @@ FEM = register(
         method="10-node tetrahedra, reduced-order model",
         words="linear waves on 10-node tetrahedra by a reduced-order model",
         solve=lambda scene, times, options: answer(
-            prepare(scene, options), scene, options.progress, times=times
+            reduce_scene(scene, options), scene, options.progress, times=times
         ),
         default_size=default_size,
         limits=partial(_limits, held_air_limits, True),

@@ -51,18 +51,12 @@ from skinwave.models.free_keys import (
 )
 from skinwave.models.laws import relaxing
 from skinwave.models.options import DEFAULT, solver_name, underflow_to_zero
-from skinwave.models.reduced import (
-    ReducedBody,
-    cache_key,
-    cached_record,
-    reduced_of,
-    store_record,
-    typical_spots,
-)
+from skinwave.models.reduced import ReducedBody, reduced_of, typical_spots
 from skinwave.models.reduced import answer as answer_of
+from skinwave.models.reduced_cache import cache_key, cached_record
 from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.scene import Body, Scene
-from skinwave.system.effort import Clock, Progress, one_thread, silent
+from skinwave.system.effort import Clock, Progress, silent
 from skinwave.typing import Bools, Floats
 
 TOLERANCE = 0.01  # relative error of a strong line
@@ -174,15 +168,11 @@ def prepare(
         load=scene.load,
     )  # fmt: skip
     name = cache.key(FORMAT, of_body, scene.pressure, scene.reading, keys)
-    with clock("read from cache"):
-        fields = cached_record(name)
-    if fields is None:
-        stage = _Stage(
-            scene=scene, bodies=bodies, mesh=mesh, reference=reference, tolerance=tolerance,
-            solver=solver,
-        )  # fmt: skip
-        fields = _reduce(stage, clock, report, build)
-        store_record(name, fields)
+    stage = _Stage(
+        scene=scene, bodies=bodies, mesh=mesh, reference=reference, tolerance=tolerance,
+        solver=solver,
+    )  # fmt: skip
+    fields = cached_record(name, clock, partial(_reduce, stage, clock, report, build))
     effort = meshed.with_cost(fields["effort"], clock, build, h or default_size(body))
     return ParametricBody(
         scene=scene, keys=keys, bodies=bodies, reference=reference, **fields | {"effort": effort}
@@ -253,7 +243,7 @@ def _reduce(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict
         for geometry in geometries.values():
             geometry()
     variants = [stage.variant(at, geometries) for at in stage.training()]
-    with clock("factorise and reduce"), one_thread():
+    with clock("factorise and reduce"):
         model, error, factorisations = reduce_affine(
             list(geometries.values()), variants, frequencies, band=DEFAULT.band,
             tolerance=SHARE * tolerance, solver=stage.solver, progress=partial(report, "reduce"),
@@ -262,7 +252,7 @@ def _reduce(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict
     for mesh in map(stage.mesh, geometries):
         P, points = _surface(scene, mesh)
         surface.append((P[~fixed_dofs(mesh.mesh, mesh.constraints)].T @ model.basis, points))
-    with clock("lines"), one_thread():
+    with clock("lines"):
         strong = _strong_lines(model, frequencies, variants)
         bases, error_of_lines = _line_bases(stage, model, frequencies, strong, report)
     effort = Effort(

@@ -1,9 +1,9 @@
-"""Reduced bodies: the offline stage, which is cached, and the response to any load.
+"""Reduced bodies: the offline stage, which `reduced_cache` keeps, and the response to any load.
 
-    reduce_body: body, outputs, surface load -> ReducedBody
-    prepare:     scene -> ReducedBody that its probes read, once per machine
-    respond:     ReducedBody, moving pressure -> ReducedResponse
-    answer:      ReducedBody, scene -> Response from rest
+    reduce_body:  body, outputs, surface load -> ReducedBody
+    reduce_scene: scene -> ReducedBody that its probes read, once per machine
+    respond:      ReducedBody, moving pressure -> ReducedResponse
+    answer:       ReducedBody, scene -> Response from rest
 
     u(t) = Re sum_f lines exp(2 pi i f t) + Re sum_m start exp(pole t)
 
@@ -23,8 +23,6 @@ from fem.energy import mean_power
 from fem.krylov import load_subspace
 from fem.maxwell import maxwell_only
 from fem.reduced import exponential_sum, impulse_response, line_response
-from meshes import cache
-from meshes.records import decode, encode
 from simple_model import Effort, Material, MovingPressure, Response
 from simple_model.load.focus import spot_width
 from simple_model.load.path_cells import path_samples
@@ -37,17 +35,12 @@ from skinwave.bodies.sheet import air
 from skinwave.bodies.sizes import default_size
 from skinwave.models import meshed
 from skinwave.models.laws import relaxing
-from skinwave.models.options import (
-    DEFAULT,
-    SolveOptions,
-    sample_times,
-    solver_name,
-    underflow_to_zero,
-)
+from skinwave.models.options import DEFAULT, SolveOptions, sample_times, underflow_to_zero
+from skinwave.models.reduced_cache import cache_key, cached_record, path_key
 from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import SURFACE, Body, Reading, Scene
-from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
+from skinwave.system.effort import Clock, Progress, peak_memory, silent
 from skinwave.typing import Bools, Floats
 
 
@@ -67,7 +60,7 @@ class ReducedBody:
     support that moves, coordinates are relative to the support, and `inertia` (r,) is the inertial
     force per acceleration.
 
-    The `probes` (p, 2) in m read the quantity of `reading`. Its components at rest are `read`
+    The `probes` (p, 2) in m read the quantity of `reading`. Its static components are `read`
     (p c, r) of the coordinates, `sag` (p c,) under gravity, and `translation` (p c,) for 1 m of
     support motion. The materials of the probes are `solids`, if the quantity depends on them. If
     the body is reduced for one path, `path` identifies it. The `effort` is that of the offline
@@ -111,7 +104,7 @@ class ReducedResponse:
 
 
 @underflow_to_zero()
-def prepare(
+def reduce_scene(
     scene: Scene,
     options: SolveOptions = DEFAULT,
     *,
@@ -141,75 +134,35 @@ def prepare(
     own = None if reading.is_plain else outputs
     many_outputs = 24  # about as many as a load along one path has parts
     along = scene.loads[0] if own_path and outputs.shape[0] > many_outputs else None
-    path = path_key(along) if along else ""
+    path, rate = (path_key(along), reading.record.rate) if along else ("", 0)
     name = cache_key(
         body, build, probes, solver, tolerance, outputs=own, load=load,
-        path=f"{path} {reading.record.rate}" if along else "", band=options.band,
+        path=f"{path} {rate}" if along else "", band=options.band,
     )  # fmt: skip
-    with clock("read from cache"):
-        reduced = cached_record(name)
-    if reduced is None:
-        with one_thread():  # a second thread saves a tenth of the time, and rounds differently
-            reduced = _prepare(
-                body, build, outputs, clock, report, solver, tolerance, load, along,
-                reading.record.rate if along else 0, options.band,
+
+    def reduce() -> ReducedBody:
+        operators = meshed.assemble(build, clock, report)
+        support = load.support_motion
+        with clock("factorise and reduce"):
+            report("factorise", 0.0)
+            P, points = even_part(*meshed.surface_load(build, load), build.symmetry)
+            still = meshed.sag(build, operators, outputs, load, solver)
+            loads = meshed.spread(P, typical_spots(body, points))
+            if along:
+                path_share = 3  # of the tolerance: error of the load along a path
+                loads = path_loads(P, points, along, path_share * tolerance)
+            reduced, _ = reduce_body(
+                body, build, operators, outputs, tolerance, surface=(P, points), loads=loads,
+                inertia=meshed.inertia(build, support.unit) if support else None, solver=solver,
+                report=report, from_loads=along is not None, rate=rate, band=options.band,
             )  # fmt: skip
-        reduced = replace(reduced, probes=probes, path=path)
-        store_record(name, reduced)
+        shift = outputs @ meshed.translation(build, support.unit if support else (0.0, 0.0, 0.0))
+        return replace(reduced, sag=still, translation=shift, probes=probes, path=path)
+
+    reduced = cached_record(name, clock, reduce)
     # Another size may have made the same mesh.
     effort = meshed.with_cost(reduced.effort, clock, build, options.h or default_size(body))
     return replace(reduced, reading=reading, solids=solids, load=load, effort=effort)
-
-
-def cached_record(name: str) -> Any:
-    """Return the record cached under a name, or None."""
-    entry = cache.load(name)
-    try:
-        return decode(entry["meta"], entry) if entry else None
-    except (ImportError, KeyError, TypeError, ValueError):  # of another version of skinwave
-        return None
-
-
-def store_record(name: str, record: object) -> None:
-    """Cache a record under a name, if all numbers of its arrays are finite."""
-    arrays: dict[str, np.ndarray] = {}
-    cache.store(name, encode(record, arrays), arrays)
-
-
-def cache_key(
-    body: Body,
-    build: Build,
-    probes: Floats,
-    solver: str,
-    tolerance: float,
-    *,
-    outputs: sparse.csr_array | None,
-    load: Load = PRESSURE,
-    path: str = "",
-    band: float = DEFAULT.band,
-) -> str:
-    """Return the cache key of everything that a reduced body depends on; `outputs` (p c, 3 n) are
-    None for normal motion at the surface.
-    """
-    mesh = build.mesh
-    # A file may name other facets of the same mesh as its top, or fix others.
-    facets = [mesh.facets[name] for name in ("top", *build.fixed)]
-    support = tuple(vars(build.support).values()) if build.support else ()
-    # Of the support motion a reduced body depends on the direction alone.
-    direction = load.support_motion.unit if load.support_motion else ()
-    read = () if outputs is None else (outputs.data, outputs.indices, outputs.indptr)
-    version = "reduced 13"  # of a cached body
-    return cache.key(
-        version, *Effort.__dataclass_fields__, body, mesh.points, mesh.tets, mesh.region, *facets,
-        build.material, build.symmetry, build.fixed, build.absorbing, build.coat, build.drag,
-        build.held, build.tension, *support, probes, band, tolerance, solver_name(solver),
-        versions(), *read, replace(load, support_motion=None), direction, path,
-    )  # fmt: skip
-
-
-def path_key(pressure: MovingPressure) -> str:
-    """Return what identifies the path of a focus and its spot."""
-    return cache.digest(path_samples(pressure).round(9), pressure.profile, pressure.height)
 
 
 def path_loads(
@@ -219,30 +172,6 @@ def path_loads(
     return load_subspace(
         meshed.spread(P, pressure.spot(points, path_samples(pressure)).T), tolerance
     )
-
-
-def _prepare(
-    body: Body, build: Build, outputs: sparse.csr_array, clock: Clock, report: Progress,
-    solver: str, tolerance: float, load: Load, along: MovingPressure | None, rate: int,
-    band: float,
-) -> ReducedBody:  # fmt: skip
-    operators = meshed.assemble(build, clock, report)
-    path_share = 3  # of that tolerance: error of the load along a path
-    with clock("factorise and reduce"):
-        report("factorise", 0.0)
-        P, points = even_part(*meshed.surface_load(build, load), build.symmetry)
-        still = meshed.sag(build, operators, outputs, load, solver)
-        motion = load.support_motion
-        loads = meshed.spread(P, typical_spots(body, points))
-        if along:
-            loads = path_loads(P, points, along, path_share * tolerance)
-        reduced, _ = reduce_body(
-            body, build, operators, outputs, tolerance, surface=(P, points), loads=loads,
-            inertia=meshed.inertia(build, motion.unit) if motion else None, solver=solver,
-            report=report, from_loads=along is not None, rate=rate, band=band,
-        )  # fmt: skip
-    moved = outputs @ meshed.translation(build, motion.unit if motion else (0.0, 0.0, 0.0))
-    return replace(reduced, sag=still, translation=moved)
 
 
 def typical_spots(body: Body, points: Floats) -> Floats:
@@ -321,9 +250,9 @@ def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Fl
         reduced_lines(pressure, reduced.points, part)
         for pressure, part in zip(pressures, parts, strict=True)
     ]
-    if motion := reduced.load.support_motion:
-        inertial = -motion.acceleration * np.asarray(reduced.inertia)
-        each.append((np.array([motion.frequency]), inertial[None]))
+    if support := reduced.load.support_motion:
+        inertial = -support.acceleration * np.asarray(reduced.inertia)
+        each.append((np.array([support.frequency]), inertial[None]))
     if len(each) == 1:
         return each[0]
     frequencies, forces = zip(*each, strict=True)
@@ -339,8 +268,8 @@ def respond(
     frequencies, forces = reduced_forces(reduced, *pressures)
     frequencies, forces = frequencies[frequencies < highest], forces[frequencies < highest]
     lines, start = line_response(reduced.poles, forces, frequencies)
-    if motion := reduced.load.support_motion:  # the support moves at once, with the body at rest
-        start += impulse_response(reduced.poles, -motion.speed * np.asarray(reduced.inertia))
+    if support := reduced.load.support_motion:  # it moves at once, with the body at rest
+        start += impulse_response(reduced.poles, -support.speed * np.asarray(reduced.inertia))
     damping = reduced.damping, reduced.radiation
     power = mean_power(*damping, forces, lines, frequencies, reduced.branches)
     imbalance, radiated = meshed.energy_balance(power)
@@ -385,8 +314,8 @@ def answer(
         strongest = strength[~is_mean].max(initial=0.0)
         chosen = is_mean | (strength > negligible_line_ratio * strongest)
         chosen &= below_half_the_rate(motion.frequencies, times)
-        moving = from_rest(select_lines(motion, chosen), times)
-        waveforms = meshed.with_sag(moving, reduced.sag, quantity)
+        vibration = from_rest(select_lines(motion, chosen), times)
+        waveforms = meshed.with_sag(vibration, reduced.sag, quantity)
     effort = replace(
         reduced.effort,
         seconds={**reduced.effort.seconds, **clock.seconds},
@@ -407,8 +336,9 @@ def steady_waveforms(reduced: ReducedBody, scene: Scene, times: Floats) -> Float
     # Under the mean an unconstrained body has no steady state.
     chosen = below_half_the_rate(motion.frequencies, times)
     chosen &= scene.body.is_held | (motion.frequencies > 0)
-    moving = synthesise(motion.frequencies[chosen], motion.lines[chosen], times)
-    return quantity.waveforms(meshed.with_sag(moving, reduced.sag, quantity), len(reduced.probes))
+    vibration = synthesise(motion.frequencies[chosen], motion.lines[chosen], times)
+    waveforms = meshed.with_sag(vibration, reduced.sag, quantity)
+    return quantity.waveforms(waveforms, len(reduced.probes))
 
 
 def components(
@@ -425,16 +355,16 @@ def components(
 
 
 def in_motion(
-    rest: ReducedResponse, quantity: Quantity, solids: tuple[Material, ...]
+    static: ReducedResponse, quantity: Quantity, solids: tuple[Material, ...]
 ) -> ReducedResponse:
-    """Return the components of a quantity, with rates and relaxing stress, from those at rest."""
+    """Return the components of a quantity, with rates and relaxing stress, from `static` ones."""
     if not (quantity.rate or quantity.relaxes):
-        return rest
-    s, outputs = 2j * np.pi * rest.frequencies, rest.lines.shape[1]
+        return static
+    s, outputs = 2j * np.pi * static.frequencies, static.lines.shape[1]
     return replace(
-        rest,
-        lines=rest.lines * meshed.line_factor(quantity, s, solids, outputs),
-        start=rest.start * meshed.line_factor(quantity, rest.poles, solids, outputs),
+        static,
+        lines=static.lines * meshed.line_factor(quantity, s, solids, outputs),
+        start=static.start * meshed.line_factor(quantity, static.poles, solids, outputs),
     )
 
 

@@ -9,7 +9,7 @@ from simple_model import Response, Statement
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.reduced import ReducedBody, answer, prepare
+from skinwave.models.reduced import ReducedBody, answer, reduce_scene
 from skinwave.planning import errors, refinement
 from skinwave.planning.extent import absorbing_error
 from skinwave.planning.plan import plan
@@ -81,4 +81,4 @@ def all_warnings(
 
 @lru_cache(maxsize=4)  # of Tactons on the same bodies
 def _prepare(scene: Scene, h: float, solver: str, tolerance: float) -> ReducedBody:
-    return prepare(scene, SolveOptions(h=h, solver=solver, tolerance=tolerance))
+    return reduce_scene(scene, SolveOptions(h=h, solver=solver, tolerance=tolerance))

@@ -18,7 +18,7 @@ from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import discretise
 from skinwave.bodies.supports import EDGES
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.reduced import answer, prepare, reduction_tolerance
+from skinwave.models.reduced import answer, reduce_scene, reduction_tolerance
 from skinwave.models.relative_change import relative_changes
 from skinwave.models.symmetry import mirrored_axes
 from skinwave.planning.estimates import FAR, absorbing_reflection
@@ -49,7 +49,7 @@ def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -
     axes = symmetry(scene)
 
     def waveforms(wider: float, reduction: float) -> Floats:
-        prepared = prepare(
+        prepared = reduce_scene(
             replace(scene, body=body), replace(options, h=size), symmetry=axes,
             reduction=reduction, discretise=partial(discretise, wider=wider),
         )  # fmt: skip

@@ -22,7 +22,13 @@ from skinwave.bodies.sizes import coarsest_size, default_size
 from skinwave.models import Model, named
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import ReducedBody, answer, prepare, reduced_forces, steady_waveforms
+from skinwave.models.reduced import (
+    ReducedBody,
+    answer,
+    reduce_scene,
+    reduced_forces,
+    steady_waveforms,
+)
 from skinwave.models.relative_change import relative_changes
 from skinwave.scene.scene import SAMPLE_RATE as RATE
 from skinwave.scene.scene import Scene
@@ -101,7 +107,7 @@ def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> tuple[floa
     coarsening = 2.0  # of the default element size
     h = min(coarsening * default_size(scene.body), coarsest_size(scene.body))
     moving = replace(scene, load=scene.load.moving)
-    coarse = prepared or prepare(moving, SolveOptions(h=h))
+    coarse = prepared or reduce_scene(moving, SolveOptions(h=h))
     detuning = 0.010  # relative excess of the natural frequencies of the coarse mesh
     values = coarse.poles.values * (1 - detuning)
     frequencies, forces = reduced_forces(coarse, *scene.loads)

@@ -26,7 +26,7 @@ from skinwave.models.options import (
 )
 from skinwave.models.plate_modes import FROM_REST, RITZ_ERROR, STRETCHED, thin_plate_part
 from skinwave.models.point_kernel import SAME_LOAD
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.planning import errors, estimates, left_out
 from skinwave.planning.deflection import linear_deflection, stretches
 from skinwave.planning.extent import absorbing_error, extent, symmetry
@@ -381,7 +381,7 @@ def _with_band(scene: Scene, options: SolveOptions, axes: str, times: Floats) ->
     widest = 4  # times its usual band, for a reduced model of a stiff body under fast loads
     for band in (options.band * n for n in range(1, widest)):
         tried = replace(options, h=h, band=band)
-        coarse = prepare(scene, tried, symmetry=axes, own_path=True)
+        coarse = reduce_scene(scene, tried, symmetry=axes, own_path=True)
         moved = answer(coarse, scene, times=times).values
         if above_band(moved, times[1], band) <= options.tolerance / 2:
             return replace(options, band=band)

@@ -94,7 +94,7 @@ def refine(
 
     def solve(size: float, progress: Progress = options.progress) -> tuple[ReducedBody, Array]:
         sized = replace(options, h=size, progress=progress)
-        prepared = reduced.prepare(meshed, sized, symmetry=symmetry, own_path=True)
+        prepared = reduced.reduce_scene(meshed, sized, symmetry=symmetry, own_path=True)
         return prepared, quantity_of_interest(prepared, scene, reduced.answer(prepared, scene))
 
     check_mesh(body, h or default_size(body))

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, resolved_lines
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST, STRETCHED
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import png
 from skinwave.report.palette import colour, label, marker
@@ -92,7 +92,7 @@ def _mechanisms(body: Body, h: float | None, progress: Progress) -> Mapping[str,
 
     if not body.of_kind.is_plate:
         still = Scene(pressure=STILL, body=body)
-        linear = partial(answer, prepare(still, SolveOptions(h=h, progress=progress)))
+        linear = partial(answer, reduce_scene(still, SolveOptions(h=h, progress=progress)))
         return {
             "linear load": by(linear, "linear"),
             "squared load": by(linear, "pressure_squared"),

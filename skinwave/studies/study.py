@@ -22,7 +22,7 @@ from skinwave.models import named
 from skinwave.models.limits import check_takes
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import ReducedBody, answer, prepare
+from skinwave.models.reduced import ReducedBody, answer, reduce_scene
 from skinwave.planning.assessment import assess, coarser_body
 from skinwave.planning.plan import chosen_model, plan
 from skinwave.planning.simulate import compute, solve
@@ -291,7 +291,7 @@ def _runs(
             reporting = replace(size_of[column], progress=partial(_report, progress, column))
             with or_failed(failures, column):
                 if several:
-                    prepared[column] = prepare(scene, reporting)
+                    prepared[column] = reduce_scene(scene, reporting)
                 else:
                     planned = plan(scene, replace(reporting, model=models[column]))
                     response = solve(scene, planned)

@@ -23,7 +23,7 @@ from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.models.plate_modes import MODES as PLATES
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.planning.deflection import stretches
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import legend, png
@@ -167,7 +167,7 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
     started = time.perf_counter()
     if named(candidate.model).is_reduced:
         size = SolveOptions(h=candidate.h)
-        prepared = prepare(scene, size, reduction=candidate.tolerance)
+        prepared = reduce_scene(scene, size, reduction=candidate.tolerance)
         response, ready = answer(prepared, scene), time.perf_counter()
         answer(prepared, scene)
         return response, ready - started, time.perf_counter() - ready, peak_memory()

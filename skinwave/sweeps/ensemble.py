@@ -29,7 +29,7 @@ from skinwave.models.flat_body import HARMONIC
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.parametric import lines_of
-from skinwave.models.reduced import components, prepare
+from skinwave.models.reduced import components, reduce_scene
 from skinwave.planning.simulate import compute
 from skinwave.report.styles import SHOWN
 from skinwave.results.comparison import steady_rms
@@ -332,7 +332,7 @@ def _steady_lines(scene: Scene, method: Method, together: bool) -> tuple[Floats,
         f, a = lines_of(cached_shared_body(family, size, how.tolerance, how.solver), scene.body)
         a = a * (scene.pressure.peak_pressure / pressure.peak_pressure)
     else:
-        motion = components(prepare(scene, how), *scene.loads)
+        motion = components(reduce_scene(scene, how), *scene.loads)
         f, a = motion.frequencies, motion.lines
     return f[f > 0], a[f > 0]
 

@@ -18,7 +18,7 @@ from skinwave.models.covering import Covering, cached_shared_body, covering
 from skinwave.models.free_keys import FreeKey, free_keys, with_values
 from skinwave.models.options import SolveOptions
 from skinwave.models.point_kernel import SAME_LOAD
-from skinwave.models.reduced import ReducedBody, answer, prepare
+from skinwave.models.reduced import ReducedBody, answer, reduce_scene
 from skinwave.planning.assessment import assess
 from skinwave.planning.plan import model_from_rest
 from skinwave.planning.refinement import comparison_size, refine
@@ -195,7 +195,7 @@ def prepare_body(
     """Return a reduced body with elements of h in m; in a family, the one with these values."""
     if family:
         return parametric.at(cached_shared_body(family, h, tolerance, solver), dict(values))
-    return prepare(subject, SolveOptions(h=h, tolerance=tolerance, solver=solver))
+    return reduce_scene(subject, SolveOptions(h=h, tolerance=tolerance, solver=solver))
 
 
 def families(hardest: Mapping[Scene, DesignPoint], tolerance: float, workers: int = 1) -> Families:

@@ -11,7 +11,7 @@ from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
 from simple_model.load.focus import spot_width
 from skinwave.bodies.build import Build, build, operators
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import ReducedBody, answer, prepare
+from skinwave.models.reduced import ReducedBody, answer, reduce_scene
 from skinwave.scene.scene import STILL, Body, Scene
 from skinwave.typing import Floats
 from skinwave.verify.case import Checks, below, case, relative
@@ -108,7 +108,7 @@ def durations() -> Checks:
 @cache
 def _prepare() -> ReducedBody:
     still = Scene(pressure=STILL, body=BODY, probes=PROBES)
-    return prepare(still, SolveOptions(h=H), reduction=1e-4)
+    return reduce_scene(still, SolveOptions(h=H), reduction=1e-4)
 
 
 @cache

@@ -16,7 +16,7 @@ from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
 from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import modes_of, plate_of
-from skinwave.models.reduced import answer, prepare, typical_spots
+from skinwave.models.reduced import answer, reduce_scene, typical_spots
 from skinwave.models.stretching import reduced_answer
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import BODIES, Mounting, Placement, Scene
@@ -80,7 +80,7 @@ def test_a_quarter_in_air_moves_like_the_whole(around):
     still = replace(LOAD, tacton=replace(LOAD.tacton, trajectory=Trajectory()))
     scene = replace(SCENE, pressure=still, body=replace(SHEET, air=around))
     whole, part = (
-        answer(prepare(scene, SolveOptions(h=H), symmetry=axes), scene).displacement
+        answer(reduce_scene(scene, SolveOptions(h=H), symmetry=axes), scene).displacement
         for axes in ("", "xy")
     )
     assert np.linalg.norm(part - whole) < 2e-3 * np.linalg.norm(whole)
@@ -91,7 +91,7 @@ def test_elements_and_modes_ring_alike_in_air(around):
     """Lowest natural frequencies and decays of a stretched sheet, of modes that probes can read."""
     held = Mounting(tension_x=30.0, tension_y=10.0)
     sheet = replace(BODIES["a6-sheet"], width=0.06, height=0.05, air=around, mounting=held)
-    reduced = prepare(replace(SCENE, body=sheet), SolveOptions(h=2e-3))
+    reduced = reduce_scene(replace(SCENE, body=sheet), SolveOptions(h=2e-3))
     found = reduced.poles.values
     found = found[found.imag > 1.0]
     found = found[np.argsort(found.imag)][:3]
@@ -108,7 +108,7 @@ def test_small_motion_of_a_stretching_sheet_is_linear():
     tacton = replace(LOAD.tacton, duration=0.4, am_frequency=60.0)
     scene = replace(SCENE, pressure=replace(LOAD, peak_pressure=1e-3, tacton=tacton))
     times = np.arange(4000) / 1e4
-    linear = answer(prepare(scene, SolveOptions(h=2e-3)), scene).displacement
+    linear = answer(reduce_scene(scene, SolveOptions(h=2e-3)), scene).displacement
     modes = reduced_answer(scene, times, SolveOptions(h=2e-3)).displacement
     settled = slice(3000, None)
     a, b = (u[settled] - u[settled].mean(axis=0) for u in (linear, modes))

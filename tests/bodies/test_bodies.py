@@ -19,7 +19,7 @@ from skinwave.bodies.build import build
 from skinwave.commands.cli import main
 from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
@@ -92,7 +92,7 @@ def test_a_body_of_half_the_size_moves_alike():
     scene = skinwave.Scene(pressure=STILL, body=Body(), probes=((0.0, 0.0), (0.015, 0.0)))
     sizes = (replace(scene, body=Body(width=side, height=side)) for side in (0.1, 0.05))
     whole, half = (
-        answer(prepare(each, SolveOptions(h=0.004), symmetry="xy"), scene) for each in sizes
+        answer(reduce_scene(each, SolveOptions(h=0.004), symmetry="xy"), scene) for each in sizes
     )
     assert compare(whole, half).relative_l2.max() < 0.05
     early = whole.times < 0.03  # before a wave of 5 m/s is back from 50 mm further out

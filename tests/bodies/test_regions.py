@@ -17,7 +17,7 @@ from skinwave.models import parametric
 from skinwave.models.free_keys import has_affine_operators, values_at
 from skinwave.models.free_keys import with_values as with_free_values
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import components, prepare
+from skinwave.models.reduced import components, reduce_scene
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Scene
@@ -111,7 +111,7 @@ def test_materials_of_tissue_and_bone_can_be_varied(body):
         assert dict(changed.regions)["bone"].density == values[DENSITY]
         frequencies, found = parametric.lines(free, values)
         own = components(
-            prepare(replace(scene, body=changed), SolveOptions(h=4e-3)), scene.pressure
+            reduce_scene(replace(scene, body=changed), SolveOptions(h=4e-3)), scene.pressure
         )
         expected = own.lines[[np.argmin(np.abs(own.frequencies - f)) for f in frequencies]]
         assert line_errors(found, expected).max() < 0.01

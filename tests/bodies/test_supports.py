@@ -24,7 +24,7 @@ from skinwave.bodies.build import build, operators
 from skinwave.bodies.tissue import support
 from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.planning.extent import symmetry
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
@@ -118,7 +118,7 @@ def test_an_absorbing_base_replaces_a_half_space():
         "[tacton]\nam_frequency_hz = 20\nduration_s = 0.06\n[body]\nbase = 'absorbing'\n"
         "size_x_mm = 30\nsize_y_mm = 30\nthickness_mm = 12\n[probes]\npoints_mm = [[0, 0], [12, 0]]"
     )
-    prepared = prepare(scene, SolveOptions(h=10e-3), symmetry="xy")
+    prepared = reduce_scene(scene, SolveOptions(h=10e-3), symmetry="xy")
     found, exact = answer(prepared, scene).values, compute(scene, "flat-body").values
     error = np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0)
     assert error.max() < 0.08

@@ -19,7 +19,7 @@ from meshes.surface.repair import check
 from meshes.surface.triangulation import volume
 from skinwave.commands.cli import main
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import prepare
+from skinwave.models.reduced import reduce_scene
 from skinwave.scene.scene import STILL, Body, Scene
 
 pytestmark = pytest.mark.usefixtures("read_here")
@@ -600,7 +600,7 @@ def test_the_cache_distinguishes_facet_sets_of_a_file(tmp_path):
         part = block.facets["top"][block.points[block.facets["top"]][..., 0].max(axis=1) < 1e-9]
         facets = {"sides": block.facets[held], "top": {**block.facets, "part": part}[pushed]}
         meshes.write(body.file, replace(block, facets=facets))
-        read.append(prepare(scene, SolveOptions(h=0.005)))
+        read.append(reduce_scene(scene, SolveOptions(h=0.005)))
     stiffness = [np.abs(prepared.poles.values[:3]).sum() for prepared in read]
     assert stiffness[0] != pytest.approx(stiffness[1], rel=1e-3)
     assert len(read[1].points) == 2 * len(read[2].points)

@@ -16,7 +16,7 @@ from skinwave.bodies import Body
 from skinwave.bodies.build import build, operators
 from skinwave.models import meshed, reduced, symmetry
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.models.symmetry import axes_of_probes
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute, solve
@@ -37,13 +37,13 @@ def test_a_prepared_body_comes_from_the_cache_unchanged(tmp_path, monkeypatch):
     scene = loads(SHORT)
     phases = []
     options = SolveOptions(h=0.012, progress=lambda phase, _: phases.append(phase))
-    first = answer(prepare(scene, options), scene)
+    first = answer(reduce_scene(scene, options), scene)
     assert "reduce" in phases
     phases.clear()
-    again = answer(prepare(scene, options), scene)
+    again = answer(reduce_scene(scene, options), scene)
     assert phases == ["mesh"]
     np.testing.assert_array_equal(first.displacement, again.displacement)
-    prepare(scene, replace(options, h=0.008))
+    reduce_scene(scene, replace(options, h=0.008))
     assert "reduce" in phases  # another mesh is another entry
 
 
@@ -57,9 +57,9 @@ def test_the_expansion_point_follows_the_lowest_natural_frequency(stiffer, monke
     assert points[1] == pytest.approx(points[0] * np.sqrt(stiffer), rel=1e-6)
     monkeypatch.setenv("SKINWAVE_CACHE", "")
     scene = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=ON_X)
-    found = prepare(scene, SolveOptions(h=0.008)).effort.reduced_dofs
+    found = reduce_scene(scene, SolveOptions(h=0.008)).effort.reduced_dofs
     monkeypatch.setattr(meshed, "expansion_point", lambda *_: points[0])
-    assert found < prepare(scene, SolveOptions(h=0.008)).effort.reduced_dofs
+    assert found < reduce_scene(scene, SolveOptions(h=0.008)).effort.reduced_dofs
 
 
 def test_a_body_with_many_probes_is_reduced_for_its_path():
@@ -67,9 +67,11 @@ def test_a_body_with_many_probes_is_reduced_for_its_path():
     places = np.random.default_rng(0).uniform(-0.015, 0.015, (60, 2))
     many = replace(few, probes=ON_X + tuple(map(tuple, places.tolist())))
     options = SolveOptions(h=0.012, tolerance=0.015)
-    body = prepare(many, options, own_path=True)
-    assert body.effort.reduced_dofs < prepare(many, options).effort.reduced_dofs / 2
-    found, expected = (answer(b, s).values for b, s in ((body, many), (prepare(few, options), few)))
+    body = reduce_scene(many, options, own_path=True)
+    assert body.effort.reduced_dofs < reduce_scene(many, options).effort.reduced_dofs / 2
+    found, expected = (
+        answer(b, s).values for b, s in ((body, many), (reduce_scene(few, options), few))
+    )
     size = np.linalg.norm(expected, axis=0)
     assert (np.linalg.norm(found[:, :3] - expected, axis=0) < 3e-3 * size).all()
     other = replace(CIRCLE, trajectory=replace(PATH, size=0.01))
@@ -97,7 +99,7 @@ def test_the_key_of_a_body_holds_solver_options_and_shapes(tmp_path, monkeypatch
 
     def made(symmetry="", reduction=None, **options):
         before = len(list(tmp_path.glob("*.npz")))
-        prepare(scene, SolveOptions(h=0.01, **options), symmetry=symmetry, reduction=reduction)
+        reduce_scene(scene, SolveOptions(h=0.01, **options), symmetry=symmetry, reduction=reduction)
         return len(list(tmp_path.glob("*.npz"))) > before
 
     assert made()
@@ -126,7 +128,7 @@ def motions(monkeypatch, body, probes, h):
     scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=probes), []
     for axes in (axes_of_probes, lambda probes, among: ""):
         monkeypatch.setattr(symmetry, "axes_of_probes", axes)
-        made = reduced.prepare(scene, SolveOptions(h=h), reduction=1e-6)
+        made = reduced.reduce_scene(scene, SolveOptions(h=h), reduction=1e-6)
         found.append(reduced.answer(made, scene))
     return found
 

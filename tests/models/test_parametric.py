@@ -26,8 +26,7 @@ from skinwave.models.free_keys import free_keys, values_at, with_values
 from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer as own_answer
-from skinwave.models.reduced import components
-from skinwave.models.reduced import prepare as prepare_own
+from skinwave.models.reduced import components, reduce_scene
 from skinwave.scene.scene import BODIES, Body, Layer, Scene
 from skinwave.system.effort import silent
 
@@ -96,13 +95,13 @@ def test_lines_are_those_of_the_full_body_at_least_loss(slab, prepared):
 def test_the_waveform_from_rest_is_that_of_the_materials_own_body(slab, prepared):
     (values,) = random_values(prepared.keys, 1, seed=2)
     body = with_values(slab.body, prepared.keys, values)
-    own = own_answer(prepare_own(replace(slab, body=body), SolveOptions(h=H)), slab)
+    own = own_answer(reduce_scene(replace(slab, body=body), SolveOptions(h=H)), slab)
     found = parametric.answer(prepared, values)
     moving = np.linalg.norm(own.values - own.values.mean(axis=0))
     assert np.linalg.norm(found.values - own.values) < 0.005 * moving
     other = replace(slab.pressure.tacton, am_frequency=90.0)
     scene = replace(slab, pressure=replace(slab.pressure, tacton=other))
-    expected = own_answer(prepare_own(replace(slab, body=body), SolveOptions(h=H)), scene).values
+    expected = own_answer(reduce_scene(replace(slab, body=body), SolveOptions(h=H)), scene).values
     found = own_answer(parametric.at(prepared, values), scene).values
     assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected)
 
@@ -266,7 +265,9 @@ def prepared_sheet():
 
 
 def own_lines(scene, body, frequencies):
-    own = components(prepare_own(replace(scene, body=body), SolveOptions(h=COARSE)), scene.pressure)
+    own = components(
+        reduce_scene(replace(scene, body=body), SolveOptions(h=COARSE)), scene.pressure
+    )
     return own.lines[[np.argmin(np.abs(own.frequencies - f)) for f in frequencies]]
 
 
@@ -282,7 +283,7 @@ def test_lines_in_air_are_those_of_each_sheets_own_reduction(prepared_sheet):
 def test_the_waveform_from_rest_is_that_of_the_sheets_own_body_and_balances_energy(prepared_sheet):
     (values,) = random_values(prepared_sheet.keys, 1, seed=2)
     scene = replace(SCENE, body=with_values(SHEET, prepared_sheet.keys, values))
-    own = prepare_own(scene, SolveOptions(h=COARSE))
+    own = reduce_scene(scene, SolveOptions(h=COARSE))
     found, expected = parametric.answer(prepared_sheet, values), own_answer(own, SCENE)
     moving = np.linalg.norm(expected.values - expected.values.mean(axis=0))
     assert np.linalg.norm(found.values - expected.values) < 1e-3 * moving

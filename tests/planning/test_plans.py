@@ -22,7 +22,7 @@ from skinwave.bodies.slab import discretise
 from skinwave.bodies.supports import Mounting
 from skinwave.models import named
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.planning.estimates import NO_BOUND, cutoff_frequency, side_reflections
 from skinwave.planning.extent import absorbing_error, extent
 from skinwave.planning.plan import plan
@@ -279,7 +279,7 @@ def test_a_symmetric_scene_is_halved(path, axes):
     assert required.symmetry == axes
     assert required.error <= 0.3
     size = SolveOptions(h=0.008)
-    whole, part = (answer(prepare(scene, size, symmetry=both), scene) for both in ("", axes))
+    whole, part = (answer(reduce_scene(scene, size, symmetry=both), scene) for both in ("", axes))
     assert part.effort.dofs <= whole.effort.dofs / 2 ** len(axes) * 1.2
     np.testing.assert_allclose(
         part.displacement, whole.displacement, atol=2e-3 * np.abs(whole.displacement).max()
@@ -291,7 +291,7 @@ def test_meshes_are_refined_until_they_meet_the_tolerance():
     scene = loads(text + "[focus]\npeak_pressure_pa = 0.1\n[probes]\npoints_mm = [[0, 0], [5, 0]]")
     loose, tight = (plan(scene, SolveOptions(tolerance=x, model="fem")) for x in (0.2, 0.04))
     assert tight.h < loose.h
-    finer = answer(prepare(scene, SolveOptions(h=1.6e-3), symmetry="xy"), scene)
+    finer = answer(reduce_scene(scene, SolveOptions(h=1.6e-3), symmetry="xy"), scene)
     for required in (loose, tight):
         misfit = compare(finer, answer(required.prepared, scene)).relative_l2.max()
         assert required.error / 5 < misfit < 2 * required.error
@@ -330,7 +330,7 @@ def test_the_error_of_absorbing_sides_is_the_change_with_a_wide_layer():
     scene = replace(LAYER, body=Body(width=0.03, height=0.03, depth=8e-3))
     options = SolveOptions(h=float(element_sizes(scene.body)[0]))
     usual, wide = (
-        answer(prepare(scene, options, discretise=partial(discretise, wider=x)), scene)
+        answer(reduce_scene(scene, options, discretise=partial(discretise, wider=x)), scene)
         for x in (1.0, 4.0)
     )
     true = compare(wide, usual).relative_l2.max()

@@ -24,7 +24,7 @@ from skinwave.measure.predicted import predicted_lines, predicted_waveforms, tar
 from skinwave.models import parametric
 from skinwave.models.meshed import load_in_steps, surface_load
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import answer, prepare
+from skinwave.models.reduced import answer, reduce_scene
 from skinwave.patterns.conversion import write_pattern
 from skinwave.patterns.pattern import Options
 from skinwave.planning.extent import symmetry
@@ -301,7 +301,7 @@ def test_pressure_only_functions_refuse_other_loads():
     with pytest.raises(ValueError, match="needs a load normal to it"):
         loads(SHEAR + "[body]\npreset = 'paper-sheet-loose'")
     pressed = replace(scene, load=Load())
-    reduced = prepare(pressed, SolveOptions(h=6e-3))
+    reduced = reduce_scene(pressed, SolveOptions(h=6e-3))
     assert np.isfinite(answer(reduced, pressed).values).all()
     with pytest.raises(ValueError, match="is reduced for"):
         answer(reduced, scene)
@@ -326,7 +326,7 @@ def test_materials_can_be_varied_under_any_moving_load(load):
     free = skinwave.prepare(scene, {MODULUS: (1.5e4, 3e4)}, h=6e-3)
     values = {MODULUS: 2.6e4}
     own = with_values(scene, values)
-    reduced = prepare(own, SolveOptions(h=6e-3))
+    reduced = reduce_scene(own, SolveOptions(h=6e-3))
     found, expected = parametric.answer(free, values).values, answer(reduced, own).values
     assert far(found, expected).max() < 0.01
 
@@ -441,7 +441,7 @@ def test_another_tone_reuses_the_reduction(monkeypatch, tmp_path):
     another = replace(UP, frequency=90.0, amplitude=1e-6)
     at_rest = Scene(pressure=MovingPressure(tacton=Tacton()), body=COLUMN, probes=((0.0, 0.0),))
     first, louder, along = (
-        prepare(replace(at_rest, load=load), SolveOptions(h=6e-3))
+        reduce_scene(replace(at_rest, load=load), SolveOptions(h=6e-3))
         for load in (Load(support_motion=UP), Load(support_motion=another), Load())
     )
     assert "factorise and reduce" not in louder.effort.seconds

@@ -112,9 +112,9 @@ def test_the_forearm_deflects_most_near_the_rayleigh_speed(tmp_path, monkeypatch
 
 
 def test_bodies_are_prepared_once(scene, monkeypatch):
-    prepared, inner = [], reductions.prepare
+    prepared, inner = [], reductions.reduce_scene
     counting = lambda scene, how: prepared.append((scene, how.h)) or inner(scene, how)  # noqa: E731
-    monkeypatch.setattr(reductions, "prepare", counting)
+    monkeypatch.setattr(reductions, "reduce_scene", counting)
     reductions.prepare_body.cache_clear()
     rows = swept("tacton.speed_m_per_s=2:8:3", "body.thickness_mm=12,13", *ON_SMALL)
     assert {row["status"] for row in rows} == {"done"}
