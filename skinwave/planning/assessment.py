@@ -13,7 +13,7 @@ from skinwave.models.reduced import ReducedBody, answer, reduce_scene
 from skinwave.planning import errors, refinement
 from skinwave.planning.extent import absorbing_error
 from skinwave.planning.plan import plan
-from skinwave.planning.plan_warnings import response_warnings, stated
+from skinwave.planning.plan_warnings import response_warnings
 from skinwave.scene.scene import Scene, without_tacton
 from skinwave.typing import Array
 
@@ -49,7 +49,8 @@ def assess(
     )  # fmt: skip
     parts += errors.left_out_parts(scene, named(response.model), tolerance, coarse)
     statement = Statement(parts=tuple(parts), tolerance=tolerance)
-    return stated(scene, response, statement, errors.element_warnings(scene, size))
+    warnings = errors.element_warnings(scene, size)
+    return errors.with_statement(scene, response, statement, warnings)
 
 
 def coarser_body(
@@ -60,7 +61,7 @@ def coarser_body(
     """
     size = options.h or usual or default_size(scene.body)
     other = refinement.comparison_size(scene.body, size)
-    return _prepare(without_tacton(scene), other, options.solver, options.tolerance)
+    return _reduced(without_tacton(scene), other, options.solver, options.tolerance)
 
 
 def all_warnings(
@@ -80,5 +81,5 @@ def all_warnings(
 
 
 @lru_cache(maxsize=4)  # of Tactons on the same bodies
-def _prepare(scene: Scene, h: float, solver: str, tolerance: float) -> ReducedBody:
+def _reduced(scene: Scene, h: float, solver: str, tolerance: float) -> ReducedBody:
     return reduce_scene(scene, SolveOptions(h=h, solver=solver, tolerance=tolerance))

@@ -14,19 +14,14 @@ from skinwave.bodies.supports import FRAME
 from skinwave.models import Model, plate_modes
 from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions, sample_times
-from skinwave.models.plate_modes import (
-    FROM_REST,
-    STRETCHED,
-    first_part,
-    linear_error,
-    middle_compliance,
-    relative_modulus,
-)
+from skinwave.models.plate_modes import FROM_REST, STRETCHED, first_part, linear_error
 from skinwave.planning.estimates import mean_gain
 from skinwave.scene.scene import Scene
 
-LINEAR = 0.5  # deflection over thickness up to which bending of a sheet may be taken as linear
-NEGLIGIBLE = 0.1  # of the tolerance, of an error that is bounded rather than measured
+
+def is_small(deflection: float, limit: float = 0.5) -> bool:
+    """Whether bending is linear for a deflection over the thickness of a sheet."""
+    return deflection <= limit
 
 
 def linear_deflection(scene: Scene) -> float:
@@ -44,10 +39,8 @@ def linear_deflection(scene: Scene) -> float:
 @lru_cache(maxsize=64)
 def _largest_deflection(scene: Scene) -> float:
     """Return the largest deflection over thickness in a response from rest, or 0."""
-    middle = tuple(float(x) for x in scene.body.placement.offset)
-    with_middle = replace(
-        scene, probes=tuple(dict.fromkeys((*scene.probes, (middle[0], middle[1]))))
-    )
+    x, y = (float(x) for x in scene.body.placement.offset)
+    with_middle = replace(scene, probes=tuple(dict.fromkeys((*scene.probes, (x, y)))))
     if not takes(FROM_REST, with_middle):
         return 0.0
     u = FROM_REST.solve(with_middle, sample_times(scene), SolveOptions()).values
@@ -75,29 +68,30 @@ def stretching_error(scene: Scene, model: Model, tolerance: float) -> float:
     is_linear = model.needs_body and not model.is_nonlinear
     if not (is_linear and scene.body.of_kind.is_plate):
         return 0.0
-    plain, negligible = _displacement_scene(scene), NEGLIGIBLE * tolerance
-    bound = _stretching_bound(scene, negligible)
-    if bound > negligible and takes(STRETCHED, plain):
+    plain = _displacement_scene(scene)
+    bound, is_negligible = _stretching_bound(scene, tolerance)
+    if not is_negligible and takes(STRETCHED, plain):
         return _measured_linear_error(plain, len(sample_times(plain)))
     return min(1.0, bound)
 
 
-def _stretching_bound(scene: Scene, negligible: float) -> float:
-    """Return a bound of the relative error of linear bending at small deflection, no sharper than
-    to decide whether it is negligible: stretching raises natural frequencies by at most
-    2.6 (w / h)^2, and a resonance multiplies this.
+def _stretching_bound(
+    scene: Scene, tolerance: float, *, negligible: float = 0.1, steepest: float = 7.0,
+    hardening: float = 2.6,
+) -> tuple[float, bool]:  # fmt: skip
+    """Return a bound of the relative error of linear bending at small deflection, and whether it is
+    a `negligible` share of the tolerance; the bound is no sharper than this decision needs.
+
+    Away from a resonance the error is at most `steepest` times (w / h)^2: 0.4 to 3.3 times for
+    paper sheets of 30 to 210 mm, on four edges, two or in clips, with tension and without. Under a
+    mean deflection w, stretching raises natural frequencies by at most `hardening` times (w / h)^2:
+    0.7 times for a clamped plate, 2.6 for a simply supported one. A resonance multiplies this.
     """
     squared, plain = linear_deflection(scene) ** 2, _displacement_scene(scene)
-    # Relative error of linear bending over (w / h)^2 away from a resonance: 0.4 to 3.3 for paper
-    # sheets of 30 to 210 mm, on four edges, two or in clips, with tension and without.
-    steepest = 7.0
     bound = steepest * squared
-    if not squared or bound > negligible or not takes(FROM_REST, plain):
-        return bound
-    # Relative change of natural frequencies over (w / h)^2, under a mean deflection w: 0.7 of a
-    # clamped plate, 2.6 of a simply supported one.
-    hardening = 2.6
-    return max(bound, hardening * plate_modes.sensitivity(plain) * squared)
+    if squared and bound <= negligible * tolerance and takes(FROM_REST, plain):
+        bound = max(bound, hardening * plate_modes.sensitivity(plain) * squared)
+    return bound, bound <= negligible * tolerance
 
 
 def stretches(scene: Scene, tolerance: float) -> float:
@@ -106,14 +100,14 @@ def stretches(scene: Scene, tolerance: float) -> float:
     """
     if not takes(STRETCHED, scene):
         return 0.0
-    plain, negligible = _displacement_scene(scene), NEGLIGIBLE * tolerance
-    if _stretching_bound(scene, negligible) > negligible:
+    plain = _displacement_scene(scene)
+    if not _stretching_bound(scene, tolerance)[1]:
         error = _measured_linear_error(plain, len(first_part(plain, sample_times(plain))))
         if error > tolerance / 2:
             return error
     error = stretching_error(scene, FROM_REST, tolerance)
-    is_beyond = error > tolerance / 2 or linear_deflection(scene) > LINEAR
-    return error if is_beyond else 0.0
+    is_linear = error <= tolerance / 2 and is_small(linear_deflection(scene))
+    return 0.0 if is_linear else error
 
 
 def deflection_ratio(scene: Scene, response: Response) -> float:
@@ -135,16 +129,11 @@ def mean_sag(scene: Scene) -> float:
     """
     body = scene.body
     if body.mounting == FRAME and body.solid.orthotropy is None:
-        at_rest = relative_modulus(body, 0.0).real * body.bending_stiffness
+        at_rest = plate_modes.relative_modulus(body, 0.0).real * body.bending_stiffness
         compliance_of_middle = 0.0056 * min(body.width, body.height) ** 2 / at_rest
     else:
-        compliance_of_middle = middle_compliance(body)
-    return float(_mean_force(scene) * compliance_of_middle)
-
-
-def _mean_force(scene: Scene) -> float:
-    """Return the mean force in N on the middle of a flat body."""
+        compliance_of_middle = plate_modes.middle_compliance(body)
     downwards = -scene.load.tractions(np.array([[0.0, 0.0, 1.0]]))[:, 0, 2]
     forces = [2 * np.pi * each.spot_scale ** 2 * mean_gain(replace(scene, pressure=each))
               for each in scene.loads]  # fmt: skip
-    return float(downwards @ forces)
+    return float(downwards @ forces * compliance_of_middle)

@@ -1,25 +1,35 @@
-"""Parts of the expected error of a response that depend on what its model leaves out of the scene.
+"""The stated error of a response: its parts, and the response with the statement and warnings.
 
-A model yields the parts of its own error, a plan adds these, and `simple_model.statement` has the
-rule by which they add.
+A model yields the parts of its own error. Plans and assessments add parts due to what the model
+leaves out of the scene. `simple_model.statement` has the rule by which they add.
 """
 
-from collections.abc import Iterator
-from math import inf
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from math import inf, pi
 
-from simple_model import ErrorPart
+from simple_model import ErrorPart, Response, Statement
 from simple_model.load.spot_map import SpotMap
 from skinwave.models import Model
 from skinwave.models.laws import own_laws, series_tolerance
-from skinwave.models.limits import takes
+from skinwave.models.limits import takers, takes
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.plate_modes import STRETCHED, thick_mesh_part
 from skinwave.models.reduced import ReducedBody
 from skinwave.planning.deflection import stretching_error
-from skinwave.planning.left_out import series_error
-from skinwave.planning.plan_warnings import rigid_body_drift, under_resolved
+from skinwave.planning.left_out import sensitivity, series_error
+from skinwave.planning.plan_warnings import response_warnings, rigid_body_drift, under_resolved
 from skinwave.planning.refinement import enough
 from skinwave.scene.scene import Scene
+
+
+def with_statement(
+    scene: Scene, response: Response, statement: Statement, cautions: Iterable[str] = ()
+) -> Response:
+    """Return a response with the statement of its error, and with its warnings and `cautions`."""
+    warnings = (*statement.warnings, *cautions, *response_warnings(scene, response))
+    effort = replace(response.effort, errors=statement, warnings=warnings)
+    return replace(response, load=scene.pressure, effort=effort)
 
 
 def own_parts(model: Model, scene: Scene, options: SolveOptions = DEFAULT) -> tuple[ErrorPart, ...]:
@@ -40,12 +50,11 @@ def left_out_parts(
     """
     yield from focus_parts(scene)
     if error := stretching_error(scene, model, tolerance):
-        has_other = takes(STRETCHED, scene)
-        cure = f"use --model {STRETCHED.name}" if has_other else "use a thicker sheet"
-        yield ErrorPart(
-            name="stretching", source=f"stretching, which {model.name} leaves out", error=error,
-            cure=cure if has_other else f"{cure} or a lower pressure",
-        )  # fmt: skip
+        cure = "use a thicker sheet or a lower pressure"
+        if takes(STRETCHED, scene):
+            cure = f"use --model {STRETCHED.name}"
+        source = f"stretching, which {model.name} leaves out"
+        yield ErrorPart(name="stretching", source=source, error=error, cure=cure)
     if (laws := own_laws(scene.body)) and model.takes_series(scene.body):
         yield ErrorPart(
             name="series",
@@ -69,8 +78,7 @@ def element_parts(
     """Return the parts of linear elements of h in m, from the relative error of each cause; that of
     the `mesh` is inf if it is unknown, and `above_band` that of motion above a `band` in Hz.
     """
-    elements = f"elements of {1e3 * h:.3g} mm"
-    cure = "use smaller elements"
+    elements, cure = f"elements of {1e3 * h:.3g} mm", "use smaller elements"
     if tolerance < mesh < inf:
         cure = f"use elements of about {1e3 * enough(scene, h, mesh, tolerance):.2g} mm"
     if mesh == inf:
@@ -104,6 +112,25 @@ def band_part(scene: Scene, band: float, error: float) -> ErrorPart:
         cure = f"read the displacement, or {cure}"
     source = f"the {scene.quantity} above {band:g} Hz"
     return ErrorPart(name="band", source=source, error=error, cure=cure)
+
+
+def sides_parts(
+    scene: Scene, model: Model, reflections: float, tolerance: float
+) -> Iterator[ErrorPart]:
+    """Yield the part due to reflections from the sides that a model leaves out."""
+    others = takers(scene) if 4 * reflections > tolerance else []  # may cure the total
+    source = f"reflections from the sides, which {model.name} leaves out"
+    cure = f"use --model {others[0]}" if others else "use absorbing sides"
+    yield ErrorPart(name="sides", source=source, error=reflections, cure=cure)
+
+
+def step_part(scene: Scene, dt: float) -> ErrorPart:
+    """Return the part due to time steps of dt in s of average acceleration."""
+    value, frequency = sensitivity(scene)
+    # Frequencies are lower by (w dt)^2 / 12 (Hughes 1987, chapter 9).
+    error = min(1.0, value * (2 * pi * frequency * dt) ** 2 / 12)
+    source = f"a time step of {1e3 * dt:.3g} ms"
+    return ErrorPart(name="steps", source=source, error=error, cure="use a smaller time step")
 
 
 def start_parts(model: Model, error: float) -> Iterator[ErrorPart]:

@@ -1,6 +1,7 @@
 """A-priori estimates: the relevant lines of a response, and reflections from the sides."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,14 +18,34 @@ from skinwave.bodies.supports import EDGES
 from skinwave.scene.scene import SAMPLE_RATE, Body, Scene
 from skinwave.typing import Complex, Floats
 
-NO_BOUND = 2.0  # difference of two waveforms over the larger one, which it never exceeds
-FAR = 0.25  # m, beyond which waves are neglected
+
+@dataclass(frozen=True, kw_only=True)
+class ReflectionEstimate:
+    """Numbers of the estimates of reflections from the sides of a body.
+
+    Reflections of the four sides may be `in_phase`; slabs reflected 0.5 to 0.9 times as much. Where
+    viscosity dominates, a free side reflects more than its image source: `overdamped` slabs of 80
+    to 120 mm reflected 0.9 to 1.1 times the estimate with both factors, of 70 mm up to 1.5 times.
+    On a base that is not clamped, waves of all frequencies bend the body as a whole: the factor is
+    `unclamped`, and small plates had up to 2.3.
+    """
+
+    unknown: float = 2.0  # difference of two waveforms over the larger one, never exceeded
+    far: float = 0.25  # m, beyond which waves are neglected
+    duration: float = 0.1  # s of the responses
+    in_phase: float = 2.0
+    overdamped: float = 1.5
+    unclamped: float = 2.0
+    absorbing: float = 0.03  # reflection coefficient of an absorbing side and its layer
+
+
+ESTIMATE = ReflectionEstimate()
 
 
 def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
-    """Return frequencies (f,) in Hz of the lines that move the probes, and the share (f, p) of each
-    in the power of the motion of the infinite body or, without its wavenumber integral, of the
-    load.
+    """Return frequencies (f,) in Hz of the lines that move the probes, and each line's share (f, p)
+    of the power at the probes of an infinite body; of the power of the load if that body has no
+    wavenumber integral.
     """
     body = scene.body
     if scene.tacton.trajectory.shape == "recorded":
@@ -59,31 +80,29 @@ def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> f
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
 
 
-def has_wavenumber_solution(scene: Scene) -> bool:
-    """Whether a wavenumber integral solves the scene, apart from reflections from the sides."""
-    spot = gaussian_sum(scene.pressure.height, scene.pressure.profile)
-    return is_flat_layer(scene.body) and spot is not None
-
-
-def side_reflections(scene: Scene) -> float:
+@lru_cache(maxsize=64)
+def side_reflections(scene: Scene, given: ReflectionEstimate = ESTIMATE) -> float:
     """Return the ratio of reflections from the sides to the motion of the probes in an infinite
-    body, at most `NO_BOUND`, which also stands for unknown reflections.
+    body, at most `unknown`, which also stands for reflections that cannot be estimated.
 
     The reflection of a side at a probe is the motion of an infinite body at the mirror image of the
-    probe. The estimate is the root of the four energies times 2, because reflections may be in
-    phase, and times up to 1.5 where shear waves cannot oscillate. Absorbing sides do
-    not reflect, and a half-space has no sides.
+    probe. The estimate is the root of the four energies, times the factors of `given`. Absorbing
+    sides do not reflect, and a half-space has no sides.
     """
     body, probes = scene.body, scene.probe_points
+    if (
+        not is_flat_layer(body)
+        or gaussian_sum(scene.pressure.height, scene.pressure.profile) is None
+    ):
+        return given.unknown
     half = np.array([body.width, body.height]) / 2
-    images = [] if is_laterally_infinite(body) else _reflecting(body, _mirror_images(probes, half))
-    if not images:
+    each = zip(EDGES, _mirror_images(probes, half), strict=True)  # left, right, front and back
+    images = [image for name, image in each if body.side(name) != "absorbing"]
+    if is_laterally_infinite(body) or not images:
         return 0.0
-    is_estimated = scene.load.is_normal
-    if not is_estimated or _to_edge(scene, half) < 2 * scene.pressure.spot_scale:
-        return NO_BOUND
-    estimated_duration = 0.1  # s of the estimate of reflections
-    duration = min(scene.tacton.duration, estimated_duration)
+    if not scene.load.is_normal or _to_edge(scene, half) < 2 * scene.pressure.spot_scale:
+        return given.unknown
+    duration = min(scene.tacton.duration, given.duration)
     times = np.arange(max(2, round(duration * SAMPLE_RATE))) / SAMPLE_RATE
     points = np.vstack([probes, *images])
     # Other quantities reflect about as the displacement of the surface does.
@@ -93,16 +112,11 @@ def side_reflections(scene: Scene) -> float:
     own, *reflected = (u**2).mean(axis=0).reshape(-1, len(probes))
     ratio = float(np.sqrt((sum(reflected) / np.maximum(own, 1e-300)).max()))
     critical = min(1.0, _loss_at_cut_off(body) / 2)
-    # Reflections of the four sides may be in phase; slabs reflected 0.5 to 0.9 times as much. Where
-    # viscosity dominates, a free side reflects more than its image source: overdamped slabs of 80
-    # to 120 mm reflected 0.9 to 1.1 times the estimate with both factors, of 70 mm up to 1.5 times.
-    in_phase, overdamped = 2.0, 1.5
-    ratio *= in_phase * (1 + (overdamped - 1) * critical)
-    unclamped = 2.0  # factor for a base that is not clamped: small plates had up to 2.3
+    ratio *= given.in_phase * (1 + (given.overdamped - 1) * critical)
     if body.base != "clamped":
-        # Waves of all frequencies travel from side to side and bend the body as a whole.
-        ratio = unclamped * ratio / max(1 - unclamped * ratio, unclamped * ratio / NO_BOUND)
-    return min(NO_BOUND, ratio)
+        ratio *= given.unclamped
+        ratio /= max(1 - ratio, ratio / given.unknown)
+    return min(given.unknown, ratio)
 
 
 def _loss_at_cut_off(body: Body) -> float:
@@ -114,16 +128,16 @@ def _loss_at_cut_off(body: Body) -> float:
     return float(max(modulus.imag / modulus.real for modulus in moduli))
 
 
-def absorbing_reflection(scene: Scene, half: Floats, highest: float) -> float:
+def absorbing_reflection(
+    scene: Scene, half: Floats, highest: float, given: ReflectionEstimate = ESTIMATE
+) -> float:
     """Return the ratio of the reflection of absorbing sides, at distances `half` (2,) in m from the
     middle, to the steady motion of the probes; 1, unknown, for a body with too little loss.
 
     The wavenumber integral of the infinite body gives the motion due to mirror images of the focus
     in the four sides, for lines of the load up to `highest` in Hz.
     """
-    body = scene.body
-    width = scene.pressure.spot_scale
-    path = path_places(scene.tacton.trajectory)
+    width, path = scene.pressure.spot_scale, path_places(scene.tacton.trajectory)
     if _to_edge(scene, half) < 2 * width:
         return 1.0
     foci = np.array([path, *_mirror_images(path, half)])
@@ -132,15 +146,14 @@ def absorbing_reflection(scene: Scene, half: Floats, highest: float) -> float:
     low = lines.frequencies <= max(highest, 1.0)
     frequencies, index = np.unique(lines.frequencies[low], return_inverse=True)
     strength = np.bincount(index, lines.strengths[low] ** 2)
-    table = np.arange(0.0, FAR, width / 2)
+    table = np.arange(0.0, given.far, width / 2)
     try:
-        g = point_response(compliance(body), table, 2 * np.pi * frequencies, width)
+        g = point_response(compliance(scene.body), table, 2 * np.pi * frequencies, width)
     except ArithmeticError:
         return 1.0
     power = np.interp(distances, table, strength @ np.abs(g) ** 2).mean(axis=2)
     ratio = power[1:].sum(axis=0) / np.maximum(power[0], 1e-300)
-    reflection = 0.03  # reflection coefficient of an absorbing side and the layer around it
-    return min(1.0, reflection * float(np.sqrt(ratio.max())))
+    return min(1.0, given.absorbing * float(np.sqrt(ratio.max())))
 
 
 def _mirror_images(points: Floats, half: Floats) -> list[Floats]:
@@ -152,23 +165,17 @@ def _mirror_images(points: Floats, half: Floats) -> list[Floats]:
     ]
 
 
-def _reflecting(body: Body, images: list[Floats]) -> list[Floats]:
-    """Return the mirror images in those sides of a body that do not absorb."""
-    each = zip(EDGES, images, strict=True)  # both are left, right, front and back
-    return [image for name, image in each if body.side(name) != "absorbing"]
-
-
 def _to_edge(scene: Scene, half: Floats) -> float:
     """Return the distance in m from the path or the probes to the nearest side."""
     points = np.vstack([path_places(scene.tacton.trajectory), scene.probe_points])
     return float((half - np.abs(points).max(axis=0)).min())
 
 
-def path_places(path: Trajectory) -> Floats:
-    """Return positions (k, 2) in m of the focus on its path."""
+def path_places(path: Trajectory, count: int = 24) -> Floats:
+    """Return positions (k, 2) in m of the focus on its path, about `count`."""
     if path.shape in BY_POINTS:
-        return path.outline[:: max(1, len(path.points) // 24)]
-    return path.at_phase(np.arange(24) / 24)
+        return path.outline[:: max(1, len(path.points) // count)]
+    return path.at_phase(np.arange(count) / count)
 
 
 def mean_gain(scene: Scene) -> float:

@@ -21,7 +21,7 @@ from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import answer, reduce_scene, reduction_tolerance
 from skinwave.models.relative_change import relative_changes
 from skinwave.models.symmetry import mirrored_axes
-from skinwave.planning.estimates import FAR, absorbing_reflection
+from skinwave.planning.estimates import ESTIMATE, absorbing_reflection
 from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import about_its_rest, element_sizes
 from skinwave.scene.scene import Body, Scene
@@ -41,27 +41,31 @@ def symmetry(scene: Scene) -> str:
     )
 
 
-def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -> float:
-    """Return the error of the absorbing base and sides of a meshed body, 0 without any."""
+def absorbing_error(
+    scene: Scene, body: Body, options: SolveOptions = DEFAULT, *, wider: float = 2.0,
+    margin: float = 1.5,
+) -> float:  # fmt: skip
+    """Return the error of the absorbing base and sides of a meshed body, 0 without any.
+
+    It is `margin` times the change by a layer `wider` times as wide. For slabs on springs and
+    half-spaces it was 1.0 to 1.3 times this change.
+    """
     if not has_layer(body):
         return 0.0
     size = min(float(element_sizes(body)[0]), 2 * scene.pressure.spot_scale)
     axes = symmetry(scene)
 
-    def waveforms(wider: float, reduction: float) -> Floats:
+    def waveforms(width: float, reduction: float) -> Floats:
         prepared = reduce_scene(
             replace(scene, body=body), replace(options, h=size), symmetry=axes,
-            reduction=reduction, discretise=partial(discretise, wider=wider),
+            reduction=reduction, discretise=partial(discretise, wider=width),
         )  # fmt: skip
         return about_its_rest(scene, answer(prepared, scene).values)
 
-    times_wider = 2.0  # times the width of the layer
-
     def change(reduction: float) -> float:
-        usual, wide = waveforms(1.0, reduction), waveforms(times_wider, reduction)
+        usual, wide = waveforms(1.0, reduction), waveforms(wider, reduction)
         return float(relative_changes(wide - usual, wide).max())
 
-    margin = 1.5  # error over change: slabs on springs and half-spaces had 1.0 to 1.3
     coarse_reduction = 0.01  # relative error of bodies that cannot be reduced to less
     try:
         return margin * change(reduction_tolerance(options.tolerance) / 3)  # both have this error
@@ -110,8 +114,8 @@ def _within_reflections(
     half = np.array([body.width, body.height]) / 2
     cut = half.copy()
     for axis in (0, 1):
-        alone = np.where(np.arange(2) == axis, half, FAR)
-        for shorter in np.arange(0.03, min(0.8 * half[axis], FAR), 0.01):
+        alone = np.where(np.arange(2) == axis, half, ESTIMATE.far)
+        for shorter in np.arange(0.03, min(0.8 * half[axis], ESTIMATE.far), 0.01):
             alone[axis] = shorter
             if absorbing_reflection(scene, alone, highest) <= tolerance / 10:
                 cut[axis] = shorter

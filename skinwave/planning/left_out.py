@@ -7,7 +7,7 @@ sensitivity is computed by shifting the poles of a coarse reduced model by a tho
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from math import ceil
 
 import numpy as np
@@ -34,7 +34,29 @@ from skinwave.scene.scene import SAMPLE_RATE as RATE
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
-EXACT = SolveOptions(tolerance=1e-3)  # of the models that are compared
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Accuracy of the responses that are compared.
+
+    A start is compared in the `first_samples`, then in `longer` times as many, until what may
+    follow has at most a `later_share` of its energy.
+
+    A sensitivity is that of a body on a mesh `coarser` than the default one, whose natural
+    frequencies are too high by a `detuning`. They are shifted by a relative `shift`.
+    """
+
+    options: SolveOptions = field(default_factory=lambda: SolveOptions(tolerance=1e-3))
+    first_samples: int = 1000
+    longer: int = 4
+    later_share: float = 0.02
+    coarser: float = 2.0
+    detuning: float = 0.010
+    shift: float = 1e-3
+    duration: float = 1.0  # s of the responses with shifted natural frequencies
+
+
+COMPARISON = Comparison()
 
 
 def start_error(
@@ -51,33 +73,30 @@ def start_error(
     if prepared:
         whole = answer(prepared, scene, times=times).values
         return _start(steady_waveforms(prepared, scene, times), lambda n: whole[:n], first)
-    steady, from_rest = model.solve, named(model.from_rest).solve
-    return _start(
-        steady(scene, times, EXACT).values, lambda n: from_rest(scene, times[:n], EXACT).values,
-        first,
-    )  # fmt: skip
+    steady = model.solve(scene, times, COMPARISON.options).values
+    transient = named(model.from_rest).solve
+    return _start(steady, lambda n: transient(scene, times[:n], COMPARISON.options).values, first)
 
 
-def _start(steady: Floats, from_rest: Callable[[int], Floats], first: int) -> float:
+def _start(
+    steady: Floats, transient: Callable[[int], Floats], first: int, own: Comparison = COMPARISON
+) -> float:
     """Return that difference from sample `first` on, between a steady state (t, p) and a function
-    that returns the first n samples from rest. The number of samples grows until the rest is
+    that returns the first n samples from rest. The number of samples grows until the later ones are
     negligible, assuming that the difference continues at its last level.
     """
     samples = len(steady)
-    first_samples, longer = 1000, 4  # samples of a start that are compared at first; factor on them
-    n = min(samples, first_samples)
-    later_share = 0.02  # of the energy of a start: what may follow the compared samples
+    n = min(samples, own.first_samples)
     while True:
-        whole = from_rest(n)
+        whole = transient(n)
         squared = (whole - steady[:n]) ** 2
         later = squared[3 * n // 4 :].mean(axis=0) * (samples - n)
         energy = squared[first:].sum(axis=0)
-        if n == samples or (later <= later_share * energy).all():
+        if n == samples or (later <= own.later_share * energy).all():
             break
-        n = min(samples, longer * n)
+        n = min(samples, own.longer * n)
     size = (whole[first:] ** 2).sum(axis=0) + (steady[max(n, first) :] ** 2).sum(axis=0)
-    no_start = 1e-6  # of the largest probe's motion: weaker motion is round-off
-    size = np.maximum(size, no_start**2 * size.max())
+    size = np.maximum(size, 1e-12 * size.max())  # motion below 1e-6 is round-off
     return float(np.sqrt((energy + later) / np.where(size > 0, size, np.inf)).max())
 
 
@@ -94,25 +113,24 @@ def above_band_error(scene: Scene, model: Model, grid: tuple[Floats, int]) -> fl
     times, first = grid
     parts = max(2, ceil(2 * TRANSFORM_RATE * times[1]))  # of a step, with twice the band
     fine = np.asarray(times[1] / parts * np.arange(parts * (len(times) - 1) + 1), np.float64)
-    usual, wide = (model.solve(scene, t, EXACT).values for t in (times, fine))
+    usual, wide = (model.solve(scene, t, COMPARISON.options).values for t in (times, fine))
     usual, wide = usual[first:], wide[::parts][first:]
     return (1 + scene.reading.record.rate) * float(relative_changes(wide - usual, wide).max())
 
 
-def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> tuple[float, float]:
+def sensitivity(
+    scene: Scene, prepared: ReducedBody | None = None, own: Comparison = COMPARISON
+) -> tuple[float, float]:
     """Return the relative change of the worst probe's waveform per relative change of all natural
     frequencies, and the root-mean-square frequency of the motion in Hz, from two responses of a
     reduced body, by default on a coarse mesh.
     """
-    coarsening = 2.0  # of the default element size
-    h = min(coarsening * default_size(scene.body), coarsest_size(scene.body))
-    moving = replace(scene, load=scene.load.moving)
-    coarse = prepared or reduce_scene(moving, SolveOptions(h=h))
-    detuning = 0.010  # relative excess of the natural frequencies of the coarse mesh
-    values = coarse.poles.values * (1 - detuning)
+    h = min(own.coarser * default_size(scene.body), coarsest_size(scene.body))
+    without_sag = replace(scene, load=scene.load.moving)
+    coarse = prepared or reduce_scene(without_sag, SolveOptions(h=h))
+    values = coarse.poles.values * (1 - own.detuning)
     frequencies, forces = reduced_forces(coarse, *scene.loads)
-    sensitivity_duration = 1.0  # s of the responses that are compared
-    duration = min(scene.tacton.duration, sensitivity_duration)
+    duration = min(scene.tacton.duration, own.duration)
     times = np.arange(max(2, round(duration * RATE))) / RATE
 
     def waveforms(shift: float) -> Floats:
@@ -124,11 +142,11 @@ def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> tuple[floa
         return exponential_sum(rates, np.vstack([lines, start]), times)
 
     whole = waveforms(0.0)
-    moving = whole - whole.mean(axis=0)
-    speed = float(np.linalg.norm(np.diff(moving, axis=0))) * RATE
-    by = 1e-3  # of natural frequencies
-    change = float(relative_changes(waveforms(by) - whole, whole).max())
-    return change / by, speed / max(float(np.linalg.norm(moving)), 1e-300) / (2 * np.pi)
+    vibration = whole - whole.mean(axis=0)
+    speed = float(np.linalg.norm(np.diff(vibration, axis=0))) * RATE
+    change = float(relative_changes(waveforms(own.shift) - whole, whole).max())
+    frequency = speed / max(float(np.linalg.norm(vibration)), 1e-300) / (2 * np.pi)
+    return change / own.shift, frequency
 
 
 def series_error(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Limit, Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.laws import check_laws, own_laws, series_tolerance
-from skinwave.models.limits import beyond, check_takes, default_model, refusal, takers, takes
+from skinwave.models.limits import beyond, check_takes, default_model, refusal, takes
 from skinwave.models.linear_elements import FEM, step_count, time_step
 from skinwave.models.options import (
     DEFAULT,
@@ -29,6 +28,7 @@ from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import answer, reduce_scene
 from skinwave.planning import errors, estimates, left_out
 from skinwave.planning.deflection import linear_deflection, stretches
+from skinwave.planning.estimates import side_reflections
 from skinwave.planning.extent import absorbing_error, extent, symmetry
 from skinwave.planning.plan_warnings import implausible
 from skinwave.planning.record import Plan, PlanRow
@@ -108,21 +108,26 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     request = _choose_model(scene, options, sample_grid(scene, options.times))
     announce(options.progress, "estimate errors")
     model, tolerance = request.model, options.tolerance
-    the_load = ErrorPart(name="load", source="the pressure at the probes", error=0.0)
     if scene.body.of_kind.discretise:
         planned, parts = (_plan_elements if model.is_refined else _plan_without_mesh)(request)
         scene = replace(scene, body=planned.body)
         parts += errors.left_out_parts(scene, model, tolerance, planned.prepared)
-        planned = replace(planned, rows=(*planned.rows, *_law_rows(scene, model, tolerance)))
+        laws = own_laws(scene.body) if model.takes_series(scene.body) else []
+        series = [law.series(series_tolerance(tolerance)).words for law in laws]
+        replaces = f"replaces the law in {model.name}"
+        rows = [PlanRow(what="modulus law", value=words, reason=replaces) for words in series]
+        planned = replace(planned, rows=(*planned.rows, *rows))
     else:
         planned = Plan(model=model.name, body=scene.body, rows=(request.model_row(),))
-        parts = [the_load, *errors.focus_parts(scene)]
+        load = ErrorPart(name="load", source="the pressure at the probes", error=0.0)
+        parts = [load, *errors.focus_parts(scene)]
     statement = Statement(parts=tuple(parts), tolerance=tolerance)
     planned = _with_cost(planned, scene, model, options)
-    rows, cautions = (*planned.rows, _error_row(statement)), implausible(scene)
+    cure = f"cure of the largest part: {statement.cure}" if statement.cure else ""
+    row = PlanRow(what="expected error", value=statement.words, reason=cure)
     return replace(
-        planned, statement=statement, rows=rows, options=options,
-        cautions=(*planned.cautions, *cautions),
+        planned, statement=statement, rows=(*planned.rows, row), options=options,
+        cautions=(*planned.cautions, *implausible(scene)),
     )  # fmt: skip
 
 
@@ -134,24 +139,6 @@ def _with_cost(planned: Plan, scene: Scene, model: Model, options: SolveOptions)
     cost = model.cost(scene, replace(options, h=planned.h or options.h), effort)
     row = cost_row(cost, effort if model.is_reduced else None)
     return replace(planned, seconds=cost.seconds, memory=cost.memory, rows=(*planned.rows, row))
-
-
-def _error_row(statement: Statement) -> PlanRow:
-    """Return the row of the expected error: its parts, and the cure of the largest."""
-    reason = f"cure of the largest part: {statement.cure}" if statement.cure else ""
-    return PlanRow(what="expected error", value=statement.words, reason=reason)
-
-
-def _law_rows(scene: Scene, model: Model, tolerance: float) -> list[PlanRow]:
-    """Return the rows of modulus laws that Prony series replace."""
-    laws = own_laws(scene.body) if model.takes_series(scene.body) else []
-    return [
-        PlanRow(
-            what="modulus law", value=solid.series(series_tolerance(tolerance)).words,
-            reason=f"replaces the law in {model.name}",
-        )
-        for solid in laws
-    ]  # fmt: skip
 
 
 def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
@@ -192,7 +179,7 @@ def model_from_rest(scene: Scene, options: SolveOptions = DEFAULT) -> tuple[Mode
             f"a linear sheet would deflect by {significant(linear_deflection(scene), 2)} "
             f"thicknesses, and stretching changes its motion by {change_text(stretching)}"
         )
-    reflections = _reflections(scene)
+    reflections = side_reflections(scene)
     waves_share = 0.8  # of the tolerance: largest reflections of sides that may be neglected
     is_infinite = reflections <= waves_share * tolerance and takes(FLAT_BODY, scene)
     if is_infinite and (scene.body.of_kind.is_layer or _suffices(FLAT_BODY, scene, tolerance)):
@@ -213,15 +200,9 @@ def model_with_sides(scene: Scene, tolerance: float = DEFAULT.tolerance) -> tupl
     return model, why_not_elements or _why_elements(scene)
 
 
-def chosen_model(scene: Scene) -> str:
+def cheapest_model(scene: Scene) -> str:
     """Return the name of the cheapest model of a scene. Raises a ValueError if none takes it."""
-    if not scene.body.of_kind.discretise:
-        return SAME_LOAD.name
-    model, _ = model_from_rest(scene)
-    has_start = model is not FLAT_BODY or (
-        _steady_start(scene, DEFAULT.tolerance, sample_grid(scene)) is None
-    )
-    return model.name if has_start else HARMONIC.name
+    return _choose_model(scene, DEFAULT, sample_grid(scene)).model.name
 
 
 def _steady_start(scene: Scene, tolerance: float, grid: Grid) -> float | None:
@@ -233,7 +214,7 @@ def _steady_start(scene: Scene, tolerance: float, grid: Grid) -> float | None:
     except (ValueError, ArithmeticError):  # no steady state
         return None
     # Lines are reflected, and the start is the body's own vibration: their powers add.
-    return start if np.hypot(_reflections(scene), start) <= tolerance else None
+    return start if np.hypot(side_reflections(scene), start) <= tolerance else None
 
 
 def why_modes(scene: Scene, tolerance: float) -> str:
@@ -253,23 +234,13 @@ def _why_elements(scene: Scene) -> str:
     """Return the reason why no wavenumber integral replaces elements."""
     if limits := beyond(FLAT_BODY, scene):
         return f"{FLAT_BODY.name} {limits[0].why}"
-    body, reflections = scene.body, _reflections(scene)
+    body, reflections = scene.body, side_reflections(scene)
     if takes(FROM_REST, scene) and (thin := thin_plate_part(scene).error) > RITZ_ERROR.error:
         return f"shear and rotary inertia change the motion of this sheet by {change_text(thin)}"
     if body.sides == "absorbing":
         return "absorbing sides of a sheet reflect in part"
     reflected = f" about {percent(reflections)}" if reflections < 1 else ""
     return f"the {body.sides} sides reflect{reflected}, which the wavenumber integral leaves out"
-
-
-@lru_cache(maxsize=64)
-def _reflections(scene: Scene) -> float:
-    """Return the relative size of reflections that a wavenumber integral leaves out."""
-    return (
-        estimates.side_reflections(scene)
-        if estimates.has_wavenumber_solution(scene)
-        else estimates.NO_BOUND
-    )
 
 
 def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
@@ -293,7 +264,7 @@ def _plan_without_mesh(request: _Request) -> tuple[Plan, list[ErrorPart]]:
     stretching stiffens the sheet and makes its waves longer.
     """
     scene, model, options = request.scene, request.model, request.options
-    start, size, highest = request.start_error(), None, 0.0
+    start, size, highest = request.start_error(), 0.0, 0.0
     rows = [request.model_row(start, "" if model.is_infinite else model.method)]
     if model.default_size:
         size = options.h or model.default_size(scene.body)
@@ -302,36 +273,17 @@ def _plan_without_mesh(request: _Request) -> tuple[Plan, list[ErrorPart]]:
         rows.append(PlanRow(what="element size", value=f"{1e3 * size:.2f} mm", reason=reason))
     if model.needs_body:
         highest, line_row = _highest_line(scene, request.tolerance)
-        neglected = neglected_rows(scene, highest)
-        rows = [
-            line_row,
-            *rows,
-            *(row for row in neglected if not (model.is_nonlinear and "stretching" in row.what)),
-        ]
-    own = errors.own_parts(model, scene, replace(options, h=size))
+        rows = [line_row, *rows, *neglected_rows(scene, highest, model.is_nonlinear)]
+    own = errors.own_parts(model, scene, replace(options, h=size or None))
     parts = [*own, *errors.start_parts(model, start)]
-    parts += _parts_of_infinite_body(request) if model.is_infinite else []
+    if model.is_infinite:
+        above = left_out.above_band_error(scene, model, request.grid)
+        parts += errors.sides_parts(scene, model, side_reflections(scene), request.tolerance)
+        parts.append(errors.band_part(scene, TRANSFORM_RATE / 4, above))
     planned = Plan(
-        model=model.name, body=scene.body, h=size, highest=highest, rows=tuple(rows),
-    )  # fmt: skip
+        model=model.name, body=scene.body, h=size or None, highest=highest, rows=tuple(rows)
+    )
     return planned, parts
-
-
-def _parts_of_infinite_body(request: _Request) -> list[ErrorPart]:
-    """Return the parts due to reflections from the sides, and to motion above the band."""
-    scene, model = request.scene, request.model
-    reflections = _reflections(scene)
-    others = takers(scene) if 4 * reflections > request.tolerance else []  # may cure the total
-    return [
-        ErrorPart(
-            name="sides", source=f"reflections from the sides, which {model.name} leaves out",
-            error=reflections,
-            cure=f"use --model {others[0]}" if others else "use absorbing sides",
-        ),
-        errors.band_part(
-            scene, TRANSFORM_RATE / 4, left_out.above_band_error(scene, model, request.grid)
-        ),
-    ]  # fmt: skip
 
 
 def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
@@ -346,7 +298,9 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
             absorbing = absorbing_error(scene, body, options)
         else:
             body, rows, absorbing = extent(scene, options, highest)
-        for_mesh = replace(options, tolerance=rest_of(tolerance, absorbing))
+        # Independent errors add as squares. The mesh may use half the tolerance in any case.
+        of_mesh = max(tolerance**2 - absorbing**2, tolerance**2 / 4) ** 0.5
+        for_mesh = replace(options, tolerance=of_mesh)
         if highest > options.band:
             for_mesh = _with_band(replace(scene, body=body), for_mesh, axes, times)
         mesh, band = refine(scene, body, for_mesh, symmetry=axes), for_mesh.band
@@ -362,7 +316,7 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
     start = left_out.start_error(scene, model, request.grid, mesh.prepared)
     parts += errors.start_parts(model, start)
     if model.is_stepped:
-        parts.append(_step_part(scene, time_step(scene, options)))
+        parts.append(errors.step_part(scene, time_step(scene, options)))
     planned = Plan(
         model=model.name, body=body, symmetry=axes, h=mesh.h, highest=highest,
         prepared=mesh.prepared,
@@ -386,17 +340,3 @@ def _with_band(scene: Scene, options: SolveOptions, axes: str, times: Floats) ->
         if above_band(moved, times[1], band) <= options.tolerance / 2:
             return replace(options, band=band)
     return replace(options, band=options.band * widest)
-
-
-def rest_of(tolerance: float, error: float) -> float:
-    """Return what an error leaves of a tolerance for an independent one, at least half of it."""
-    return max(tolerance**2 - error**2, tolerance**2 / 4) ** 0.5
-
-
-def _step_part(scene: Scene, step: float) -> ErrorPart:
-    """Return the error of a time `step` in s of average acceleration."""
-    value, frequency = left_out.sensitivity(scene)
-    # Frequencies are lower by (w dt)^2 / 12 (Hughes 1987, chapter 9).
-    error = min(1.0, value * (2 * np.pi * frequency * step) ** 2 / 12)
-    source = f"a time step of {1e3 * step:.3g} ms"
-    return ErrorPart(name="steps", source=source, error=error, cure="use a smaller time step")

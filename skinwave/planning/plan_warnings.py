@@ -1,11 +1,11 @@
 """Warnings of a response that differs from the request, apart from its expected error."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from simple_model import MovingPressure, Response, Statement, resolved_lines
+from simple_model import MovingPressure, Response, resolved_lines
 from simple_model.load.line_names import FEWEST_CYCLES, line_names, named_lines
 from simple_model.load.sampling import step
 from simple_model.load.tacton import LONGEST, exact_period
@@ -13,23 +13,12 @@ from simple_model.numbers import EN_DASH, plural, significant
 from simple_model.response import LINE_BINS, SETTLE, resolution
 from skinwave.models import named
 from skinwave.models.limits import cures_for, in_words
-from skinwave.planning.deflection import LINEAR, deflection_ratio
+from skinwave.planning.deflection import deflection_ratio, is_small
 from skinwave.planning.estimates import mean_gain
 from skinwave.scene.scene import Scene
 
-NONLINEAR = "plate-modes-nonlinear", "fem-nonlinear"  # the cheaper first
-LOSS = "loss_factor"
 WithRange = tuple[str, float, str, float, float, str]  # key, value, whose range, low, high, unit
 WEAK_LINE_RATIO = 0.05  # of the strongest line of a load: no warning if weaker ones are left out
-
-
-def stated(
-    scene: Scene, response: Response, statement: Statement, cautions: Iterable[str] = ()
-) -> Response:
-    """Return a response with the statement of its error, and with its warnings and `cautions`."""
-    warnings = (*statement.warnings, *cautions, *response_warnings(scene, response))
-    effort = replace(response.effort, errors=statement, warnings=warnings)
-    return replace(response, load=scene.pressure, effort=effort)
 
 
 def response_warnings(scene: Scene, response: Response) -> tuple[str, ...]:
@@ -48,10 +37,10 @@ def large_deflection(scene: Scene, response: Response) -> tuple[str, ...]:
     if named(response.model).is_nonlinear or not response.record.of_body:
         return ()
     ratio = deflection_ratio(scene, response)
-    if ratio <= LINEAR:
+    if is_small(ratio):
         return ()
-    each = [cures_for(scene, named(name)) for name in NONLINEAR] if scene.body.is_held else []
-    cures = next(filter(None, each), [])
+    nonlinear = ("plate-modes-nonlinear", "fem-nonlinear") if scene.body.is_held else ()
+    cures = next(filter(None, (cures_for(scene, named(name)) for name in nonlinear)), [])
     cure = in_words(cures, "") if cures else "use a thicker sheet or a lower pressure"
     return (
         f"the sheet deflects by {significant(ratio, 2)} times its thickness, and its stretching is "
@@ -137,7 +126,7 @@ def implausible(scene: Scene) -> tuple[str, ...]:
     """Warn of numbers that probably have another unit, and of a probe that is given twice."""
     warnings = [
         f"{key} = {value:g} is implausible; {whose} {low:g}{EN_DASH}{high:g}{unit}, so check "
-        f"{'whether it is a quality factor Q: write 1 / Q' if key == LOSS else 'its unit'}"
+        f"{'whether it is a quality factor Q: write 1 / Q' if 'loss' in key else 'its unit'}"
         for key, value, whose, low, high, unit in sorted({*_with_ranges(scene)})
         if 0 < value < low or high < value < np.inf
     ]
@@ -164,7 +153,7 @@ def _with_ranges(scene: Scene) -> Iterator[WithRange]:
     for solid in body.solids:
         yield "density_kg_m3", solid.density, "solids have", *densities, " kg/m³"
         yield "shear_modulus_pa", solid.shear_modulus, "solids have", 100, 1e12, " Pa"
-        yield LOSS, solid.loss_factor, "solids have", 0, 2, ""
+        yield "loss_factor", solid.loss_factor, "solids have", 0, 2, ""
     thinnest = 1e-3 if kind.is_plate else 0.1
     for layer in body.layers:
         yield "thickness_mm", 1e3 * layer.thickness, "layers have", 1e-3, 1e3, " mm"

@@ -27,11 +27,32 @@ from skinwave.system.effort import Progress, silent
 from skinwave.system.processes import beside
 from skinwave.typing import Array, Floats
 
-# Ratio of their cells along an axis; and of successive sizes of a refinement, at least.
-STEP = 1.3
-# Of the default element size: the coarsest mesh of bodies whose elements follow their layers, and
-# of others, and the finest that is tried.
-COARSEST, FINEST = 4.5, 0.4
+
+@dataclass(frozen=True, kw_only=True)
+class Sizes:
+    """Sequence of element sizes, and the meshes that are compared.
+
+    Sizes lie between `coarsest` and `finest` times the default size; `coarsest_hand` is that of
+    bodies whose elements do not follow their layers, and coarser ones would cut off the rim.
+    Successive sizes have the ratio `step` or more, except for the finest one, `last_step`.
+
+    Meshes whose cells have a ratio that is `comparable` are compared in any case, otherwise those
+    nearest to `cells_apart`. The size that is compared is larger by `apart`: the first above the
+    default size, the second up to it, where cells far from the focus are as large in both meshes.
+    Closer meshes differ more by chance.
+    """
+
+    coarsest: float = 4.5
+    coarsest_hand: float = 2.8
+    finest: float = 0.4
+    step: float = 1.3
+    last_step: float = 1.1
+    comparable: tuple[float, float] = (1.25, 1.75)
+    cells_apart: float = 1.45
+    apart: tuple[float, float] = (1.6, 2.0)
+
+
+SIZES = Sizes()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,8 +124,7 @@ def refine(
     coarse_sizes = sizes[: max(1, np.count_nonzero(sizes > size))]
     wanted = apart(body, size) * size
     before = comparison_size(body, h) if h else nearest_size(coarse_sizes, wanted)
-    comparable = 1.25, 1.75  # ratios of cells of meshes that are compared in any case
-    low, high = comparable
+    low, high = SIZES.comparable
     if body.file and not h and low < map_size(body) / size < high:
         before = map_size(body)  # a mesh less, if there is a map
     with beside() as begin:
@@ -112,14 +132,12 @@ def refine(
         coarser = begin(solve, before, silent) if begin and not body.file else None
         prepared, values = solve(size)
         solved = {before: coarser.result() if coarser else solve(before)}
-    cells_apart = 1.45
-    last_step = 1.1  # to the finest mesh, at least
     while True:
         ratios = {
             each: refinement_ratio(body, coarse.effort, prepared.effort)
             for each, (coarse, _) in solved.items()
         }
-        nearest = min(ratios, key=lambda each: abs(np.log(ratios[each] / cells_apart)))
+        nearest = min(ratios, key=lambda each: abs(np.log(ratios[each] / SIZES.cells_apart)))
         # The largest estimate, because a mesh may agree with another by chance.
         found = {
             each: mesh_error(meshed, ratio, (solved[each][1], values))
@@ -131,7 +149,7 @@ def refine(
             costs = solved[before][0].effort.seconds, prepared.effort.seconds
             seconds = max(costs, key=lambda each: sum(each.values()))
             prepared = replace(prepared, effort=replace(prepared.effort, seconds=seconds))
-        if h or not tolerance < error < np.inf or sizes[-1] > size / last_step:
+        if h or not tolerance < error < np.inf or sizes[-1] > size / SIZES.last_step:
             return Refined(h=size, error=error, compared=before, prepared=prepared)
         solved[size] = prepared, values
         size = controller(meshed).nearest(finer_sizes(sizes, size), size, error, tolerance)
@@ -159,17 +177,13 @@ def first_size(scene: Scene, sizes: Floats, tolerance: float) -> float:
     """
     own = controller(scene)
     wanted = own.size(default_size(scene.body), own.at_default, tolerance)
-    coarsest = sizes[0] / STEP * (1 + 1e-9)
-    usable = sizes[sizes <= coarsest]
+    usable = sizes[sizes <= sizes[0] / SIZES.step * (1 + 1e-9)]
     return nearest_size(usable if len(usable) else sizes[-1:], wanted)
 
 
 def apart(body: Body, h: float) -> float:
     """Return the ratio of the size of elements to compare with to h in m."""
-    # Ratio of the sizes of two meshes that are compared, because closer ones differ more by chance:
-    # above the default size, and up to it, where cells far from the focus are as large in both.
-    both_apart = 1.6, 2.0
-    return both_apart[1] if h <= default_size(body) * (1 + 1e-9) else both_apart[0]
+    return SIZES.apart[h <= default_size(body) * (1 + 1e-9)]
 
 
 def nearest_size(sizes: Floats, wanted: float) -> float:
@@ -181,13 +195,13 @@ def element_sizes(body: Body, steps: int = 12) -> Floats:
     """Return the sequence of element sizes (k,) in m for a body, descending: those of whole numbers
     of cell layers, or `steps` within a factor of 2.
     """
-    coarsest, finest = COARSEST * default_size(body), FINEST * default_size(body)
-    coarsest_hand = 2.8
-    if not body.of_kind.conforming:  # coarser meshes would cut off the rim and layers
-        coarsest = min(coarsest_hand * default_size(body), COMPARED * coarsest_size(body))
-        finest = max(finest, min(default_size(body), FINE_PALM))
+    default = default_size(body)
+    coarsest, finest = SIZES.coarsest * default, SIZES.finest * default
+    if not body.of_kind.conforming:
+        coarsest = min(SIZES.coarsest_hand * default, COMPARED * coarsest_size(body))
+        finest = max(finest, min(default, FINE_PALM))
     if not _has_cell_layers(body):
-        sizes = default_size(body) * 2.0 ** (np.arange(-80, 80)[::-1] / steps)
+        sizes = default * 2.0 ** (np.arange(-80, 80)[::-1] / steps)
         sizes = sizes[(sizes <= coarsest) & (sizes >= finest)]
         if actual := body.of_kind.actual_size:  # one size for each mesh
             return sizes[
@@ -196,16 +210,16 @@ def element_sizes(body: Body, steps: int = 12) -> Floats:
         return sizes
     layered, layers = [body.depth], 1
     while layered[-1] > finest:
-        layers = max(layers + 1, round(STEP * layers))
+        layers = max(layers + 1, round(SIZES.step * layers))
         size = _layered_size(body, layers, body.depth / layers)
         layered += [size] if size < layered[-1] else []
     sizes = np.array(layered)
     return sizes[max(0, np.count_nonzero(sizes >= coarsest) - 1) :]
 
 
-def finer_sizes(sizes: Floats, size: float, ratio: float = STEP) -> Floats:
-    """Return the sizes that are finer than a size by a ratio or more, or the last size."""
-    coarser = np.count_nonzero(sizes > size / ratio * (1 + 1e-9))
+def finer_sizes(sizes: Floats, size: float) -> Floats:
+    """Return the sizes that are finer than a size by a step or more, or the last size."""
+    coarser = np.count_nonzero(sizes > size / SIZES.step * (1 + 1e-9))
     return sizes[min(coarser, len(sizes) - 1) :]
 
 
@@ -213,8 +227,9 @@ def comparison_size(body: Body, h: float) -> float:
     """Return a size in m to compare h with: coarser, or finer if h gives a single layer."""
     if actual := body.of_kind.actual_size:
         sizes = (h * np.geomspace(1, 4, 80)).tolist() + (h / np.geomspace(1, 4, 80)).tolist()
-        far = (s for s in sizes if abs(np.log(actual(body, s) / actual(body, h))) > np.log(STEP))
-        return next(far, STEP * h)
+        ratios = ((s, abs(np.log(actual(body, s) / actual(body, h)))) for s in sizes)
+        far = (s for s, ratio in ratios if ratio > np.log(SIZES.step))
+        return next(far, SIZES.step * h)
     if not _has_cell_layers(body):
         largest = max(body.width, body.height) if body.of_kind.is_bounded else np.inf
         return min(apart(body, h) * h, COMPARED * max(coarsest_size(body), h), largest)

@@ -9,7 +9,7 @@ from skinwave.bodies.sizes import COAT_FREQUENCY, coat, layer_name, thicknesses
 from skinwave.models import Cost
 from skinwave.models.reduced import reduction_tolerance
 from skinwave.models.symmetry import axes_of_probes, mirrored_axes
-from skinwave.planning.deflection import mean_sag
+from skinwave.planning.deflection import is_small, mean_sag
 from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import Refined
 from skinwave.scene.scene import Body, Scene
@@ -129,17 +129,21 @@ def coat_rows(body: Body, h: float) -> list[PlanRow]:
     return rows
 
 
-def neglected_rows(scene: Scene, highest: float) -> list[PlanRow]:
-    """Return the rows of air and stretching of a sheet under lines up to `highest` in Hz."""
+def neglected_rows(
+    scene: Scene, highest: float, stretches: bool = False, lowest: float = 20.0
+) -> list[PlanRow]:
+    """Return the row of air around a sheet, and that of stretching if the model leaves it out.
+
+    Air is estimated at half the `highest` line in Hz of the load, and at `lowest` or above.
+    """
     body = scene.body
     if not body.of_kind.is_plate:
         return []
-    lowest_air_frequency = 20.0  # Hz at which air is estimated if no line is higher
-    middle = max(highest / 2, lowest_air_frequency)
+    middle = max(highest / 2, lowest)
     air = air_mass(body, middle) / body.mass_per_area
     sag = mean_sag(scene) / body.depth
     lower = f"resonances are {percent(1 - 1 / np.sqrt(1 + air))} lower near {middle:.0f} Hz"
-    return [
+    rows = [
         PlanRow(
             what="air" if body.air else "left out: air",
             value=f"added mass {significant(air, 2)} times the mass of the sheet",
@@ -151,7 +155,8 @@ def neglected_rows(scene: Scene, highest: float) -> list[PlanRow]:
             what="left out: stretching",
             value=f"sag of {significant(sag, 2)} thicknesses",
             reason="a linear sheet; a real one stiffens above about half a thickness"
-            if sag > 0.5
+            if not is_small(sag)
             else "the mean deflection is small",
         ),
     ]
+    return rows[: 1 if stretches else 2]

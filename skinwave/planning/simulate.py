@@ -15,8 +15,8 @@ from skinwave.models.laws import check_laws
 from skinwave.models.limits import check_takes
 from skinwave.models.options import SolveOptions, from_first, sample_grid
 from skinwave.models.reduced import answer
+from skinwave.planning.errors import with_statement
 from skinwave.planning.plan import plan
-from skinwave.planning.plan_warnings import stated
 from skinwave.planning.record import Plan
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning, versions
@@ -108,4 +108,4 @@ def _solve_by_model(scene: Scene, options: SolveOptions) -> Response:
 def _with_errors(scene: Scene, planned: Plan, response: Response) -> Response:
     """Return the response with planned errors, or those measured instead, and all warnings."""
     statement = planned.statement.with_parts(response.effort.errors.parts)
-    return stated(scene, response, statement, planned.cautions)
+    return with_statement(scene, response, statement, planned.cautions)

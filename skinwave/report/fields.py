@@ -24,8 +24,7 @@ from skinwave.models import named
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import oscillating
 from skinwave.planning.assessment import assess
-from skinwave.planning.errors import element_warnings, reduction_part
-from skinwave.planning.plan_warnings import stated
+from skinwave.planning.errors import element_warnings, reduction_part, with_statement
 from skinwave.report.films import Film, check_format, film
 from skinwave.report.palette import SIGNED
 from skinwave.report.render import CAMERAS
@@ -305,7 +304,8 @@ def field(
     else:
         parts = response.effort.errors.with_parts([reduction_part(own.effort.estimate)]).parts
         statement = Statement(parts=parts, tolerance=tolerance)
-        own = stated(surface, own, statement, element_warnings(surface, response.effort.h))
+        cautions = element_warnings(surface, response.effort.h)
+        own = with_statement(surface, own, statement, cautions)
     for sentence in own.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
     return Field(scene=scene, moved=moved, times=times, effort=own.effort)

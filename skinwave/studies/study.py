@@ -24,7 +24,7 @@ from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, reduce_scene
 from skinwave.planning.assessment import assess, coarser_body
-from skinwave.planning.plan import chosen_model, plan
+from skinwave.planning.plan import cheapest_model, plan
 from skinwave.planning.simulate import compute, solve
 from skinwave.results.claims import AssessedClaim, assessable_runs, evaluate, write_claims
 from skinwave.results.files import write_lines, write_responses, write_run
@@ -204,7 +204,7 @@ def _models(scenes: Scenes, options: SolveOptions) -> dict[str, str]:
         own = model
         if model == "auto":
             is_complete = models.get(column) == COMPLETENESS[-1]
-            own = COMPLETENESS[-1] if is_complete else chosen_model(scene)
+            own = COMPLETENESS[-1] if is_complete else cheapest_model(scene)
         check_takes(named(own), scene)
         if named(own).is_reduced:
             check_mesh(scene.body, options.h or default_size(scene.body))

@@ -14,7 +14,7 @@ from skinwave.commands.cli import main
 from skinwave.models import named
 from skinwave.models.options import SolveOptions
 from skinwave.models.parametric import answer
-from skinwave.planning.plan import chosen_model, model_from_rest
+from skinwave.planning.plan import cheapest_model, model_from_rest
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Body, Scene
@@ -59,7 +59,7 @@ def test_a_sweep_of_one_scene_is_its_simulation(simulated):
 def test_plan_sweep_and_fit_choose_one_model(body):
     """A fit and a sweep start from rest; a plan may leave out the start."""
     scene = loads(f"[tacton]\nam_frequency_hz = 140\nduration_s = 0.05\n[body]\n{body}")
-    planned = named(chosen_model(scene))
+    planned = named(cheapest_model(scene))
     assert model_of(scene, SolveOptions()) == (planned.from_rest or planned.name)
     assert model_from_rest(scene)[0].name == (planned.from_rest or planned.name)
 

@@ -17,6 +17,7 @@ from skinwave.bodies.sizes import check_mesh
 from skinwave.commands import kept
 from skinwave.commands.cli import main
 from skinwave.commands.common import progress_of
+from skinwave.planning import refinement
 from skinwave.scene import paper15
 from skinwave.studies import study
 
@@ -155,7 +156,7 @@ def test_an_interrupt_keeps_finished_runs(scene, monkeypatch, capsys):
 
 def test_an_error_above_the_tolerance_is_a_warning(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.0)
+    monkeypatch.setattr(refinement, "SIZES", refinement.Sizes(finest=2.0))
     (tmp_path / "scene.toml").write_text(
         '[tacton]\nam_frequency_hz = 140\nshape = "point"\nduration_s = 0.05\n'
         '[body]\nkind = "sheet"\nmaterial = "paper"\nsize_x_mm = 40\nsize_y_mm = 40\n'
