@@ -16,9 +16,8 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.parametric import ParametricBody
 from skinwave.scene.scene import Body, Scene
 
-# Fewest bodies for each free key, and for each thickness that moves the mesh.
-FEWEST, FEWEST_OF_THICKNESS = 6, 15
-SHARE = 1 / 5  # of a tolerance, for the reduced-order model
+# Fewest bodies for each free key: a material, or a thickness that moves the mesh.
+FEWEST = {"material": 6, "thickness": 15}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +57,7 @@ def covering(
         check_scene(plain, keys, tolerance)
     except ValueError:
         return None
-    if members < sum(FEWEST_OF_THICKNESS if key.moves else FEWEST for key in keys):
+    if members < sum(FEWEST["thickness" if key.moves else "material"] for key in keys):
         return None
     ranges = tuple((key, *ends) for key, ends in free.items())
     return Covering(scene=plain, ranges=ranges, members=members, hardest=hardest or plain.body)
@@ -67,7 +66,7 @@ def covering(
 def shared_body(bodies: Covering, options: SolveOptions) -> ParametricBody:
     """Return the reduced-order model of all bodies, or raise if their ranges are too wide."""
     free = {key: (low, high) for key, low, high in bodies.ranges}
-    within = min(parametric.TOLERANCE, SHARE * options.tolerance)
+    within = min(0.01, options.tolerance / 5)
     return parametric.prepare(
         bodies.scene, free, within, options.progress, h=options.h, solver=options.solver
     )

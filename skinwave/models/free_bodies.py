@@ -28,10 +28,6 @@ from skinwave.bodies.sizes import default_size
 from skinwave.models.free_keys import FreeKey, Part, solid_at
 from skinwave.typing import Floats
 
-SAME_MODULUS = 1e-9  # relative difference of moduli that are the same
-CANDIDATES = 5  # geometries along each thickness, for sums of d and 1/d
-INDEPENDENT = 1e-9  # of the largest pivot: functions with smaller ones are sums of others
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Range:
@@ -67,13 +63,14 @@ def range_of(
     if free.any() and kind.morph:
         thinnest = body(np.where(free, 0.0, meshed).tolist())
         moved = kind.morph(thinnest, reference, h or default_size(reference))
-    along = ((1 - np.cos(np.pi * np.arange(CANDIDATES) / (CANDIDATES - 1))) / 2).tolist()
+    along = ((1 - np.cos(np.pi * np.linspace(0, 1, 5))) / 2).tolist()  # enough for d and 1/d
     each = [along if is_free else [at] for is_free, at in zip(thicknesses, meshed, strict=True)]
     candidates = list(product(*each))
     values = np.array([_terms(body(at)) for at in candidates])
     scaled = values / np.abs(values).max(axis=0)
     _, R, order = qr(scaled, mode="economic", pivoting=True)
-    rank = int((np.abs(np.diag(R)) > INDEPENDENT * abs(R[0, 0])).sum())
+    # Functions with smaller pivots are sums of others.
+    rank = int((np.abs(np.diag(R)) > 1e-9 * abs(R[0, 0])).sum())
     chosen = np.sort(order[:rank])
     rows = np.sort(qr(scaled[:, chosen].T, mode="economic", pivoting=True)[2][:rank])
     return Range(
@@ -184,11 +181,7 @@ def solids_of(reference: Reference, body: Body) -> Solids:
     if body.of_kind.equivalent:
         thinner = body.depth / reference.body.depth
         meshed = [bending_equivalent(m, thinner) for m in meshed]
-    return Solids(
-        materials=tuple(meshed),
-        springs=springs[1] / springs[0],
-        drag=drag[1] / drag[0],
-    )
+    return Solids(materials=tuple(meshed), springs=springs[1] / springs[0], drag=drag[1] / drag[0])
 
 
 def _spring_modulus(body: Body) -> float:
@@ -204,7 +197,7 @@ def _factors(meshed: Material, solid: Material) -> tuple[float, float]:
     modulus = meshed.shear_modulus / solid.shear_modulus
     density = meshed.density / solid.density
     expected, one = _times(solid, modulus, density), complex(meshed.complex_modulus(1e3))
-    if abs(one - complex(expected.complex_modulus(1e3))) > SAME_MODULUS * abs(one):
+    if abs(one - complex(expected.complex_modulus(1e3))) > 1e-9 * abs(one):
         raise ValueError(
             "the mesh of this kind of body does not have the materials of its scene; reduce it for "
             "each material"

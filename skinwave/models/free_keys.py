@@ -32,11 +32,6 @@ KEYS = (
         r"body\.(regions\.(?P<region>[^.]+)|(layers\.(?P<layer>\d+)\.)?material)\.(?P<path>(?!thickness_mm).+)"
     ),
 )
-MOST_THICKNESSES = 2
-FIXED = ("poisson", "law", "table")  # keys of a material that are not numbers, or change matrices
-MOST_CORNERS = 16
-MOST_LINES = 400  # of a load
-ROUND_OFF = 1e-9  # of a range, by which a value may be outside
 Part = int | str | None  # of a body: a layer, a region by its name, or the rest
 
 
@@ -115,11 +110,11 @@ def values_at(keys: Sequence[FreeKey], shares: Sequence[float]) -> dict[str, flo
     return {key.key: key.at(share) for key, share in zip(keys, shares, strict=True)}
 
 
-def training_shares(count: int, inside: int) -> Floats:
+def training_shares(count: int, inside: int, most_corners: int = 16) -> Floats:
     """Return shares (t, count): corners and middle of the unit cube, and `inside` points in it."""
     corners = np.array(list(product((0.0, 1.0), repeat=count)))
-    if len(corners) > MOST_CORNERS:
-        corners = np.random.default_rng(0).choice(corners, MOST_CORNERS, replace=False)
+    if len(corners) > most_corners:
+        corners = np.random.default_rng(0).choice(corners, most_corners, replace=False)
     few = np.vstack([corners, np.full((1, count), 0.5)])
     if not inside:
         return few
@@ -152,13 +147,14 @@ def solid_at(body: Body, part: Part) -> Material:
 
 def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
     part, path = _part(body, key)
-    if path[0] in FIXED:
+    fixed = ("poisson", "law", "table")  # not numbers, or change the matrices
+    if path[0] in fixed:
         raise ValueError(
             f"'{key}' cannot be free, because it changes the matrices of a body; free moduli, "
             "losses, times or densities, or reduce a body for each value"
         )
     if path != THICKNESS:
-        known = [*(name for name in MATERIAL if name not in FIXED), *SCALES]
+        known = [*(name for name in MATERIAL if name not in fixed), *SCALES]
         choose(f"free key '{key}'", path[0], known)
     if path[0] == "prony" and not (len(path) == 3 and path[1].isdecimal() and path[2] in PRONY):
         raise ValueError(f"'{key}' is not a number of a Prony term; use, e.g., prony.0.modulus_pa")
@@ -210,15 +206,15 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
             f"'{keys[0].key}' cannot be free, because no mesh of a {body.kind} follows its "
             "thickness; free that of a slab, disc or sheet, or reduce a body for each value"
         )
-    if len(keys) > MOST_THICKNESSES:
+    if len(keys) > 2:
         raise ValueError(
-            f"{len(keys)} thicknesses are free, more than {MOST_THICKNESSES}, and each "
-            "multiplies the number of meshes; free fewer"
+            f"{len(keys)} thicknesses are free, more than 2, and each multiplies the number of "
+            "meshes; free fewer"
         )
     if low := [key.key for key in keys if not key.low > 0]:
         raise ValueError(f"{low[0]} is free from 0 or below; give a smallest value above 0")
     most = 1e3 * kind.equivalent(body) if kind.equivalent else inf
-    if high := [key for key in keys if key.high > most * (1 + ROUND_OFF)]:
+    if high := [key for key in keys if key.high > most * (1 + 1e-9)]:
         raise ValueError(
             f"{high[0].key} is free up to {high[0].high:g} mm, above {most:g} mm, the "
             f"thickness of the elements of a {body.kind}, which represent only thinner ones; "
@@ -229,8 +225,8 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
 def _value(key: FreeKey, values: Mapping[str, float]) -> float:
     if key.key not in values:
         raise ValueError(f"no value is given for the free key {key.key}; give one")
-    value, slack = float(values[key.key]), ROUND_OFF * (key.high - key.low)
-    if not key.low - slack <= value <= key.high + slack:
+    value, round_off = float(values[key.key]), 1e-9 * (key.high - key.low)
+    if not key.low - round_off <= value <= key.high + round_off:
         raise ValueError(
             f"{key.key} = {value:g} is outside its range, {key.low:g} to {key.high:g}; free it "
             "over a wider range"
@@ -262,12 +258,9 @@ def _with_material(body: Body, part: Part, solid: Material) -> Body:
     return replace(body, layers=tuple(layers))
 
 
-def has_affine_operators(body: Body) -> bool:
-    """Whether the operators of a body are sums over its materials, as for a plain sheet."""
-    return body.mounting == FRAME and body.solid.orthotropy is None
-
-
-def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None:
+def check_scene(
+    scene: Scene, keys: Sequence[FreeKey], tolerance: float, most_lines: int = 400
+) -> None:
     """Raise a ValueError if sums over free materials cannot solve a scene."""
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
@@ -283,7 +276,7 @@ def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None
             f"depends on the density; remove support_motion, {own}"
         )
     check_laws(scene.body, scene.pressure)
-    if not has_affine_operators(scene.body):
+    if scene.body.mounting != FRAME or scene.body.solid.orthotropy is not None:
         raise ValueError(
             "free materials need an isotropic sheet in a frame, because tension and other "
             f"mountings do not scale with its modulus; use a frame, {own}"
@@ -296,9 +289,9 @@ def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None
             "the load has no oscillating line; give it a modulation or a moving focus, or reduce a "
             "body for each material"
         )
-    if (count := len(lines)) > MOST_LINES:
+    if (count := len(lines)) > most_lines:
         raise ValueError(
-            f"the load has {count:,} lines, the limit with free materials is {MOST_LINES}; remove "
+            f"the load has {count:,} lines, the limit with free materials is {most_lines}; remove "
             "the rhythm or signal"
         )
 

@@ -6,6 +6,7 @@ names only models that take the scene, and changes after which a model does.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from simple_model import MovingPressure
@@ -22,7 +23,6 @@ ADVISED = (
     "plate-modes-nonlinear", "fem-nonlinear-transient", "fem-harmonic", "flat-body-harmonic",
     "plate-modes",
 )  # fmt: skip
-MOST_CURES = 2  # in one sentence
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +46,7 @@ def beyond(model: Model, scene: Scene) -> list[Limit]:
     """Return the limits of a model that a scene exceeds."""
     if model.needs_body and not scene.body.of_kind.discretise:
         return [Limit(why="needs a body that moves, and the scene has none")]
-    return [*(model.limits or plain_limits)(scene)]
+    return [*(model.limits or partial(surface_limits, rates=False))(scene)]
 
 
 def takes(model: Model, scene: Scene) -> bool:
@@ -74,7 +74,10 @@ def default_model(scene: Scene) -> str:
     """Return the name of the first model that takes a scene; raises `Refused` if none does."""
     if models := takers(scene):
         return models[0]
-    raise no_model(scene)
+    cures = _any_cures(scene)
+    nearest = [named(cure.model) for cure in cures] or _candidates(scene)[:1]
+    reasons = ", and ".join(_reason(model, beyond(model, scene)) for model in nearest)
+    raise _with_cures(f"no model takes this scene: {reasons}", cures, "auto")
 
 
 def check_takes(model: Model, scene: Scene) -> None:
@@ -83,24 +86,18 @@ def check_takes(model: Model, scene: Scene) -> None:
         raise refusal(scene, model, limits)
 
 
-def refusal(scene: Scene, model: Model, limits: Sequence[Limit]) -> Refused:
+def refusal(scene: Scene, model: Model, limits: Sequence[Limit], most_cures: int = 2) -> Refused:
     """Return the refusal of a scene for some limits of a model, with cures."""
-    others = [name for name in takers(scene) if name != model.name][:MOST_CURES]
+    others = [name for name in takers(scene) if name != model.name][:most_cures]
     own = _changes(scene, model, limits)
     cures = [*own, *(Cure(words="", scene=scene, model=name) for name in others)]
-    return _with_cures(_reason(model, limits), cures or _any_cures(scene), model.name)
-
-
-def no_model(scene: Scene) -> Refused:
-    """Return the refusal of a scene that no model takes, with changes after which one does."""
-    cures = _any_cures(scene)
-    nearest = [named(cure.model) for cure in cures] or _candidates(scene)[:1]
-    reasons = ", and ".join(_reason(model, beyond(model, scene)) for model in nearest)
-    return _with_cures(f"no model takes this scene: {reasons}", cures, "auto")
+    return _with_cures(_reason(model, limits), cures or _any_cures(scene, most_cures), model.name)
 
 
 def cures_for(scene: Scene, model: Model) -> list[Cure]:
-    """Return how a model can take a scene: as it is, or after a change, if one helps."""
+    """Return the changes after which a model takes a scene: an empty change if it already does, an
+    empty list if none helps.
+    """
     if takes(model, scene):
         return [Cure(words="", scene=scene, model=model.name)]
     return [*_changes(scene, model, beyond(model, scene))]
@@ -123,13 +120,13 @@ def _reason(model: Model, limits: Sequence[Limit]) -> str:
     return f"{model.name} {', and '.join(limit.why for limit in limits)}"
 
 
-def _any_cures(scene: Scene) -> list[Cure]:
-    """Return changes of a scene after which any model takes it."""
+def _any_cures(scene: Scene, most: int = 2) -> list[Cure]:
+    """Return changes of a scene after which some model takes it."""
     cures: dict[str, Cure] = {}
     for model in _candidates(scene):
         for cure in _changes(scene, model, beyond(model, scene)):
             cures.setdefault(cure.words, cure)
-    return [*cures.values()][:MOST_CURES]
+    return [*cures.values()][:most]
 
 
 def _changes(scene: Scene, model: Model, limits: Sequence[Limit]) -> Iterator[Cure]:
@@ -193,17 +190,10 @@ def _without_load(scene: Scene) -> Scene:
     return replace(scene, load=PRESSURE, pressure=pressure)
 
 
-def plain_limits(scene: Scene) -> Iterator[Limit]:
-    """Yield the limits of models that compute only the surface displacement under a focus."""
-    if not scene.reading.is_plain:
-        yield reading_limit(scene)
-    if not scene.load.is_plain:
-        yield load_limit(scene)
-
-
-def surface_limits(scene: Scene) -> Iterator[Limit]:
-    """Yield the limits of models of the surface displacement and its rates under a focus."""
-    if not (scene.reading.record.is_normal and scene.reading.is_on_surface):
+def surface_limits(scene: Scene, *, rates: bool = True) -> Iterator[Limit]:
+    """Yield the limits of models of the surface displacement, and its rates, under a focus."""
+    reading = scene.reading
+    if not (reading.record.is_normal and reading.is_on_surface if rates else reading.is_plain):
         yield reading_limit(scene)
     if not scene.load.is_plain:
         yield load_limit(scene)
@@ -252,27 +242,17 @@ def isotropic_limits(body: Body) -> Iterator[Limit]:
     yield from flat_sheet_limits(body)
 
 
-def vacuum_limits(body: Body) -> Iterator[Limit]:
-    """Yield the limits of models with sparse matrices, which exclude air and lossy edges."""
-    yield from _edge_limits(body)
-    if body.air:
-        yield _air_limit("does not include the air around a sheet")
-
-
-def held_air_limits(body: Body) -> Iterator[Limit]:
-    """Yield the limits of elements: no lossy edges, and air only around a sheet that is held."""
-    yield from _edge_limits(body)
-    if body.air and body.sides != "clamped":
-        yield _air_limit(f"includes air only around a held sheet, not with {body.sides} sides")
-
-
-def _edge_limits(body: Body) -> Iterator[Limit]:
+def edge_and_air_limits(body: Body, *, held_air: bool) -> Iterator[Limit]:
+    """Yield the limits of elements: no lossy edges, and no air or, with `held_air`, air only around
+    a sheet that is held. Models with sparse matrices exclude air.
+    """
     if body.mounting.edge_loss:
         yield Limit(
             why="does not include lossy edges",
             cure="set edge_loss = 0", change=of_part("mounting", edge_loss=0.0),
         )  # fmt: skip
-
-
-def _air_limit(why: str) -> Limit:
-    return Limit(why=why, cure="set air = false", change=of_body(air=False))
+    if body.air and not (held_air and body.sides == "clamped"):
+        why = "does not include the air around a sheet"
+        if held_air:
+            why = f"includes air only around a held sheet, not with {body.sides} sides"
+        yield Limit(why=why, cure="set air = false", change=of_body(air=False))

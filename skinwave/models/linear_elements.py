@@ -26,7 +26,7 @@ from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import Cost, Limit, Model, meshed, register
 from skinwave.models.costs import UNITS, Cheaper, computed_times, lines_below, synthesis
 from skinwave.models.laws import has_own_law, relaxing, series_tolerance
-from skinwave.models.limits import held_air_limits, of_body, vacuum_limits
+from skinwave.models.limits import edge_and_air_limits, of_body
 from skinwave.models.options import SolveOptions, response_of, solver_name
 from skinwave.models.reduced import answer, reduce_scene
 from skinwave.models.symmetry import even_part, images, modelled_axes
@@ -92,11 +92,9 @@ def _coarser(body: Body) -> tuple[str, Callable[[Scene], Scene] | None]:
     return "", None
 
 
-def _limits(
-    air_limits: Callable[[Body], Iterator[Limit]], may_move: bool, scene: Scene
-) -> Iterator[Limit]:
+def _limits(scene: Scene, *, held_air: bool = False, may_move: bool = True) -> Iterator[Limit]:
     yield from mesh_limits(scene.body)
-    yield from air_limits(scene.body)
+    yield from edge_and_air_limits(scene.body, held_air=held_air)
     if scene.load.support_motion and not may_move:
         yield Limit(
             why=f"does not take {scene.load.support_motion.words}",
@@ -364,7 +362,7 @@ FEM = register(
             reduce_scene(scene, options), scene, options.progress, times=times
         ),
         default_size=default_size,
-        limits=partial(_limits, held_air_limits, True),
+        limits=partial(_limits, held_air=True),
         cost=_reduced_cost,
         colour="#0072B2",
         sources=(SOURCES["reduction"], SOURCES["Arnoldi"], SOURCES["macroelements"]),
@@ -379,7 +377,7 @@ register(
         method="10-node tetrahedra, line by line",
         words="the steady state of linear waves on 10-node tetrahedra",
         solve=harmonic_answer,
-        limits=partial(_limits, vacuum_limits, True),
+        limits=_limits,
         cost=_line_cost,
         colour="#CC79A7",
         sources=(SOURCES["macroelements"],),
@@ -395,7 +393,7 @@ register(
         method="10-node tetrahedra, step by step",
         words="linear waves on 10-node tetrahedra, step by step",
         solve=transient_answer,
-        limits=partial(_limits, vacuum_limits, False),
+        limits=partial(_limits, may_move=False),
         cost=_stepped_cost,
         colour="#D55E00",
         sources=(SOURCES["Newmark"], SOURCES["macroelements"]),

@@ -8,16 +8,8 @@ import numpy as np
 from scipy import sparse
 
 import fem
+from fem import load_and_probe
 from fem.krylov import EXPANSION_POINT
-from fem.load_and_probe import (
-    displacement_operator,
-    facet_geometry,
-    facet_normals,
-    facet_points,
-    probe_operator,
-    surface_frame,
-    traction_operator,
-)
 from fem.stress import materials_at, strain_operator
 from meshes import cache
 from meshes.tetmesh import corner_volumes
@@ -102,7 +94,7 @@ def expansion_point(
     slowness = {region: 1 / solid.shear_speed for region, solid in build.material.items()}
     volumes = corner_volumes(mesh.points, mesh.tets[:, :4])
     crossing = sum(volumes[mesh.region == k].sum() * each for k, each in slowness.items())
-    area = np.abs(facet_geometry(mesh.points[mesh.facets["top"]])[1][..., 2]).sum()
+    area = np.abs(load_and_probe.facet_geometry(mesh.points[mesh.facets["top"]])[1][..., 2]).sum()
     return float(np.clip(per_crossing * area / crossing, *within))
 
 
@@ -110,8 +102,11 @@ def surface_load(build: Build, load: Load = PRESSURE) -> tuple[sparse.csr_array,
     """Return the load operator P (3 n, c k), nodal forces in N of the c components of a load in Pa
     on a surface across the beam, and the points (k, 3) in m where it takes each component.
     """
-    normals, points = facet_normals(build.mesh), facet_points(build.mesh)
-    each = [traction_operator(build.mesh, t) for t in load.tractions(normals)]
+    normals, points = (
+        load_and_probe.facet_normals(build.mesh),
+        load_and_probe.facet_points(build.mesh),
+    )
+    each = [load_and_probe.traction_operator(build.mesh, t) for t in load.tractions(normals)]
     return each[0] if len(each) == 1 else sparse.hstack(each, format="csr"), points
 
 
@@ -194,7 +189,7 @@ def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array
     The surface of a file consists of flat triangles, whose normals jump at edges. There the
     direction into the body is that of the mean normal around a probe.
     """
-    return probe_operator(build.mesh, probes, patch=body.of_kind.normal_patch)
+    return load_and_probe.probe_operator(build.mesh, probes, patch=body.of_kind.normal_patch)
 
 
 def probe_rows(
@@ -212,16 +207,16 @@ def probe_rows(
     if body.of_kind.is_plate:
         return sheet_rows(body, build, probes, reading)
     mesh = build.mesh
-    places, normals = surface_frame(mesh, probes, patch=body.of_kind.normal_patch)
+    places, normals = load_and_probe.surface_frame(mesh, probes, patch=body.of_kind.normal_patch)
     points = places - np.broadcast_to(reading.depths or 0.0, len(probes))[:, None] * normals
     if quantity.is_normal:
         inwards = sparse.block_diag(-normals[:, None], format="csr")
-        return (inwards @ displacement_operator(mesh, points)).tocsr(), ()
+        return (inwards @ load_and_probe.displacement_operator(mesh, points)).tocsr(), ()
     solids = materials_at(mesh, build.material, points)
     rows = sparse.block_diag([quantity.rows(solid) for solid in solids], format="csr")
     if quantity.field == STRAIN:
         return (rows @ strain_operator(mesh, build.material, points)).tocsr(), solids
-    return (rows @ displacement_operator(mesh, points)).tocsr(), solids
+    return (rows @ load_and_probe.displacement_operator(mesh, points)).tocsr(), solids
 
 
 def check_coat(build: Build, reading: Reading) -> None:

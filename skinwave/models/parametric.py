@@ -28,27 +28,9 @@ from simple_model import Effort, Response
 from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
-from skinwave.models import meshed
-from skinwave.models.free_bodies import (
-    Range,
-    Reference,
-    affine_operators,
-    build_at,
-    geometry_shares,
-    nearest_geometry,
-    range_of,
-    reference_of,
-    solids_of,
-)
-from skinwave.models.free_keys import (
-    FreeKey,
-    check_scene,
-    free_keys,
-    meshing_shares,
-    training_shares,
-    values_at,
-    with_values,
-)
+from skinwave.models import free_bodies, free_keys, meshed
+from skinwave.models.free_bodies import Range, Reference
+from skinwave.models.free_keys import FreeKey
 from skinwave.models.laws import relaxing
 from skinwave.models.options import DEFAULT, solver_name, underflow_to_zero
 from skinwave.models.reduced import ReducedBody, reduced_of, typical_spots
@@ -58,14 +40,6 @@ from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Clock, Progress, silent
 from skinwave.typing import Bools, Floats
-
-TOLERANCE = 0.01  # relative error of a strong line
-SHARE = 0.4  # of the tolerance, for the reduced-order model and for the bases of lines
-WEAK_LINE_RATIO = 1e-3  # to the strongest line that moves the probes: weaker ones are left out
-WEAKEST_LOAD_LINE = 1e-6  # of the strongest line of the load
-FORMAT = "parametric 7"  # of a cached body
-BETWEEN = 0.3  # share of each range of a body between geometries
-INSIDE = 128  # materials inside the ranges, for the bases of lines
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,7 +82,7 @@ class ParametricBody:
 def prepare(
     scene: Scene,
     free: Mapping[str, tuple[float, float]],
-    tolerance: float = TOLERANCE,
+    tolerance: float = 0.01,
     progress: Progress | None = None,
     *,
     h: float | None = None,
@@ -151,8 +125,8 @@ def prepare(
     >>> parametric.answer(body, {key: 2.5e4}).values.shape
     (200, 5)
     """
-    keys = free_keys(scene.body, free)
-    check_scene(scene, keys, tolerance)
+    keys = free_keys.free_keys(scene.body, free)
+    free_keys.check_scene(scene, keys, tolerance)
     clock, report = Clock(), progress or silent
     with clock("mesh"):
         report("mesh", 0.0)
@@ -160,16 +134,17 @@ def prepare(
         body = bodies.body(bodies.meshed)
         # Probes on a plane of symmetry need only one half.
         axes = modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
-        mesh = cached(partial(build_at, bodies, symmetry=axes))
+        mesh = cached(partial(free_bodies.build_at, bodies, symmetry=axes))
         build = mesh(bodies.meshed)
-    reference = reference_of(body, build, keys)
+    reference = free_bodies.reference_of(body, build, keys)
     of_body = cache_key(
         body, build, scene.probe_points, solver, tolerance, outputs=_probes(scene, body, build),
         load=scene.load,
     )  # fmt: skip
-    name = cache.key(FORMAT, of_body, scene.pressure, scene.reading, keys)
+    version = "parametric 7"  # of a cached body
+    name = cache.key(version, of_body, scene.pressure, scene.reading, keys)
     stage = _Stage(
-        scene=scene, bodies=bodies, mesh=mesh, reference=reference, tolerance=tolerance,
+        scene=scene, bodies=bodies, mesh=mesh, reference=reference, tolerance=0.4 * tolerance,
         solver=solver,
     )  # fmt: skip
     fields = cached_record(name, clock, partial(_reduce, stage, clock, report, build))
@@ -183,14 +158,18 @@ def _range(body: Body, keys: tuple[FreeKey, ...], h: float | None) -> Range:
     """Return the bodies of all values of the free keys."""
 
     def at(shares: Sequence[float]) -> Body:
-        return relaxing(with_values(body, keys, values_at(keys, shares)), FIT_TOLERANCE)
+        return relaxing(
+            free_keys.with_values(body, keys, free_keys.values_at(keys, shares)), FIT_TOLERANCE
+        )
 
-    return range_of(at, meshing_shares(keys), [key.moves for key in keys], h)
+    return free_bodies.range_of(at, free_keys.meshing_shares(keys), [key.moves for key in keys], h)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Stage:
-    """Offline stage of a scene; `mesh` returns the mesh at shares of the range."""
+    """Offline stage of a scene; `mesh` returns the mesh at shares of the range. The `tolerance` is
+    one of the reduced-order model and one of the bases of lines.
+    """
 
     scene: Scene
     bodies: Range
@@ -202,7 +181,7 @@ class _Stage:
     def geometry(self, at: tuple[float, ...]) -> Geometry:
         """Return the full body at shares of the range."""
         body, build = self.bodies.body(at), self.mesh(at)
-        affine = affine_operators(body, build)
+        affine = free_bodies.affine_operators(body, build)
         P, points = _surface(self.scene, build)
         return Geometry(
             affine=affine, probes=_probes(self.scene, body, build),
@@ -213,17 +192,20 @@ class _Stage:
     def training(self) -> list[tuple[float, ...]]:
         """Return shares (k,): corners and middle at assembled geometries, and one in between."""
         count = len(self.bodies.meshed)
-        few = [nearest_geometry(self.bodies, each) for each in training_shares(count, 0).tolist()]
-        between = [(BETWEEN,) * count] if len(self.bodies.geometries) > 1 else []
+        few = [
+            free_bodies.nearest_geometry(self.bodies, each)
+            for each in free_keys.training_shares(count, 0).tolist()
+        ]
+        between = [(0.3,) * count] if len(self.bodies.geometries) > 1 else []
         return list(dict.fromkeys([*few, *between]))
 
     def variant(self, at: tuple[float, ...], geometries: Mapping[Any, Any]) -> Variant:
         """Return the body at shares of the range, on an assembled geometry or its own."""
         body = self.bodies.body(at)
-        shares = geometry_shares(self.bodies, body)
+        shares = free_bodies.geometry_shares(self.bodies, body)
         nearest = list(geometries.values())[int(np.argmax(shares))]
-        is_assembled = nearest_geometry(self.bodies, at) == at
-        solids = solids_of(self.reference, body)
+        is_assembled = free_bodies.nearest_geometry(self.bodies, at) == at
+        solids = free_bodies.solids_of(self.reference, body)
         return Variant(
             solids=replace(solids, materials=tuple(m.relaxing() for m in solids.materials)),
             shares=shares,
@@ -233,7 +215,7 @@ class _Stage:
 
 def _reduce(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict[str, Any]:
     """Reduce the body; return the cached fields of a `ParametricBody`."""
-    bodies, tolerance, scene = stage.bodies, stage.tolerance, stage.scene
+    bodies, scene = stage.bodies, stage.scene
     geometries: dict[Any, Callable[[], Geometry]] = {
         at: cached(partial(stage.geometry, at)) for at in bodies.geometries
     }
@@ -246,7 +228,7 @@ def _reduce(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict
     with clock("factorise and reduce"):
         model, error, factorisations = reduce_affine(
             list(geometries.values()), variants, frequencies, band=DEFAULT.band,
-            tolerance=SHARE * tolerance, solver=stage.solver, progress=partial(report, "reduce"),
+            tolerance=stage.tolerance, solver=stage.solver, progress=partial(report, "reduce"),
         )  # fmt: skip
     surface = []
     for mesh in map(stage.mesh, geometries):
@@ -266,7 +248,10 @@ def _reduce(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict
     }  # fmt: skip
 
 
-def _strong_lines(model: AffineModel, frequencies: Floats, variants: Sequence[Variant]) -> Bools:
+def _strong_lines(
+    model: AffineModel, frequencies: Floats, variants: Sequence[Variant],
+    weak_line_ratio: float = 1e-3,
+) -> Bools:  # fmt: skip
     """Return the mask (f,) of lines that are strong in any variant, and of the mean."""
 
     def strength(each: Variant) -> Floats:
@@ -276,23 +261,24 @@ def _strong_lines(model: AffineModel, frequencies: Floats, variants: Sequence[Va
 
     strengths = np.array([strength(each) for each in variants])
     strongest = np.where(frequencies > 0, strengths, 0.0).max(axis=1, keepdims=True)
-    return (frequencies == 0) | (strengths > WEAK_LINE_RATIO * strongest).any(axis=0)
+    return (frequencies == 0) | (strengths > weak_line_ratio * strongest).any(axis=0)
 
 
 def _line_bases(
-    stage: _Stage, model: AffineModel, frequencies: Floats, strong: Bools, report: Progress
-) -> tuple[tuple[AffineModel, ...], float]:
+    stage: _Stage, model: AffineModel, frequencies: Floats, strong: Bools, report: Progress,
+    inside: int = 128,
+) -> tuple[tuple[AffineModel, ...], float]:  # fmt: skip
     """Return the bases of the strong lines for many bodies inside the range, and their error."""
     count = len(stage.bodies.meshed)
-    bodies = [stage.bodies.body(at) for at in training_shares(count, INSIDE).tolist()]
+    bodies = [stage.bodies.body(at) for at in free_keys.training_shares(count, inside).tolist()]
     at_lines = [
-        weights(model.terms, solids_of(stage.reference, body), frequencies[strong])
+        weights(model.terms, free_bodies.solids_of(stage.reference, body), frequencies[strong])
         for body in bodies
     ]
     return line_bases(
         replace(model, forces=model.forces[:, strong]), np.stack(at_lines),
-        np.stack([geometry_shares(stage.bodies, body) for body in bodies]),
-        SHARE * stage.tolerance, partial(report, "lines"),
+        np.stack([free_bodies.geometry_shares(stage.bodies, body) for body in bodies]),
+        stage.tolerance, partial(report, "lines"),
     )  # fmt: skip
 
 
@@ -300,14 +286,16 @@ def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats
     """Return the steady state for values of the free keys, at the strong lines of the scene's load:
     frequencies (f,) in Hz, and amplitudes (f, p c) of the components at the probes.
     """
-    return lines_of(prepared, with_values(prepared.scene.body, prepared.keys, values))
+    return lines_of(prepared, free_keys.with_values(prepared.scene.body, prepared.keys, values))
 
 
 def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]:
     """Return the same for a body that differs from the scene's only in its free keys."""
-    solids = solids_of(prepared.reference, body)
+    solids = free_bodies.solids_of(prepared.reference, body)
     at_lines = weights(prepared.model.terms, solids, prepared.frequencies)
-    motion = steady_lines(prepared.bases, at_lines, geometry_shares(prepared.bodies, body))
+    motion = steady_lines(
+        prepared.bases, at_lines, free_bodies.geometry_shares(prepared.bodies, body)
+    )
     s, quantity = 2j * np.pi * prepared.frequencies, prepared.scene.reading.record
     return prepared.frequencies, motion * meshed.line_factor(quantity, s, (), motion.shape[1])
 
@@ -320,13 +308,15 @@ def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
 
 def at(prepared: ParametricBody, values: Mapping[str, float]) -> ReducedBody:
     """Return the reduced body for values of the free keys; it serves any Tacton."""
-    body = relaxing(with_values(prepared.scene.body, prepared.keys, values), FIT_TOLERANCE)
-    shares, scene = geometry_shares(prepared.bodies, body), prepared.scene
+    body = relaxing(
+        free_keys.with_values(prepared.scene.body, prepared.keys, values), FIT_TOLERANCE
+    )
+    shares, scene = free_bodies.geometry_shares(prepared.bodies, body), prepared.scene
     model = prepared.model
     read, forces, points = (
         np.tensordot(shares, each, 1) for each in (model.outputs, prepared.forces, prepared.points)
     )
-    small = operators_at(model, solids_of(prepared.reference, body), shares)
+    small = operators_at(model, free_bodies.solids_of(prepared.reference, body), shares)
     return reduced_of(
         small, forces, points, prepared.effort,
         probes=scene.probe_points, read=read, reading=scene.reading, load=scene.load,
@@ -346,7 +336,7 @@ def _surface(scene: Scene, build: Build) -> tuple[sparse.csr_array, Floats]:
 
 def _line_forces(scene: Scene, P: sparse.csr_array, points: Floats) -> tuple[Floats, fem.Complex]:
     """Return frequencies (f,) in Hz and nodal forces (f, 3 n) in N of the load's lines."""
-    frequencies, pressures = meshed.load_lines_at(scene.loads, points, WEAKEST_LOAD_LINE)
+    frequencies, pressures = meshed.load_lines_at(scene.loads, points, 1e-6)
     # Under the mean an unconstrained body would drift.
     chosen = (frequencies > 0) | scene.body.is_held
     return frequencies[chosen], (P @ pressures[chosen].T).T

@@ -10,17 +10,8 @@ import numpy as np
 from scipy import sparse
 
 import fem
+from fem import sheet_reading as sheet
 from fem.reduced_nonlinear import StretchingModes, in_plane_matrices
-from fem.sheet_reading import (
-    SheetReading,
-    displacement_rows,
-    from_plane,
-    in_plane_rows,
-    modal_quadratic_strain,
-    quadratic_strain_at,
-    sheet_reading,
-    strain_rows,
-)
 from meshes import middle_plane
 from simple_model import Material
 from simple_model.quantities import STRAIN
@@ -39,9 +30,9 @@ def sheet_rows(
     points, quantity = _points(body, build, probes), reading.record
     below = np.broadcast_to(reading.depths or 0.0, len(probes))
     heights, solid = body.depth / 2 - below, body.solid.without_loss_factor()
-    linear = displacement_rows(points, heights)
+    linear = sheet.displacement_rows(points, heights)
     if quantity.field == STRAIN:
-        linear = strain_rows(points, heights, solid.poisson)
+        linear = sheet.strain_rows(points, heights, solid.poisson)
     rows = sparse.kron(sparse.eye_array(len(probes)), quantity.rows(solid), format="csr")
     return (rows @ linear).tocsr(), (solid,) * len(probes)
 
@@ -52,14 +43,14 @@ def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> R
         normal = fem.probe_operator(build.mesh, probes)
         return lambda u: normal @ u
     (rows, _), points = sheet_rows(body, build, probes, reading), _points(body, build, probes)
-    displacement, strain = in_plane_rows(points)
+    displacement, strain = sheet.in_plane_rows(points)
     own = reading.record.rows(body.solid)
     if reading.record.field != STRAIN:
         return lambda u: rows @ u + ((displacement @ u).reshape(-1, 2) @ own[:, :2].T).ravel()
-    plane = own @ from_plane(body.solid.poisson)
+    plane = own @ sheet.from_plane(body.solid.poisson)
 
     def read(u: Floats) -> Floats:
-        stretched = (strain @ u).reshape(-1, 3) + quadratic_strain_at(points, u)
+        stretched = (strain @ u).reshape(-1, 3) + sheet.quadratic_strain_at(points, u)
         return np.asarray(rows @ u + (stretched @ plane.T).ravel())
 
     return read
@@ -80,22 +71,22 @@ def modal_reader(
         normal = fem.probe_operator(build.mesh, probes) @ modes.basis
         return lambda z: normal @ z
     (rows, _), points = sheet_rows(body, build, probes, reading), _points(body, build, probes)
-    displacement, strain = in_plane_rows(points)
+    displacement, strain = sheet.in_plane_rows(points)
     by_strain = quantity.field == STRAIN
     Q = in_plane_matrices(
         points, modes.basis, strain if by_strain else displacement, operators, solver=solver
     ).reshape(len(probes), 3 if by_strain else 2, *(2 * modes.basis.shape[1:]))
     own = quantity.rows(body.solid)[:, :2]
     if by_strain:
-        Q = Q + modal_quadratic_strain(points, modes.basis)
-        own = quantity.rows(body.solid) @ from_plane(body.solid.poisson)
+        Q = Q + sheet.modal_quadratic_strain(points, modes.basis)
+        own = quantity.rows(body.solid) @ sheet.from_plane(body.solid.poisson)
     linear = rows @ modes.basis
     Q = np.einsum("ca,pamn->pcmn", own, Q).reshape(-1, *Q.shape[2:])
     return lambda z: linear @ z + (Q @ z) @ z / 2
 
 
-def _points(body: Body, build: Build, probes: Floats) -> SheetReading:
+def _points(body: Body, build: Build, probes: Floats) -> sheet.SheetReading:
     membrane = fem.Membrane(
         triangles=middle_plane(build.mesh), thickness=body.depth, material=body.solid
     )
-    return sheet_reading(build.mesh, membrane, probes)
+    return sheet.sheet_reading(build.mesh, membrane, probes)

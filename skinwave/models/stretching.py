@@ -287,15 +287,13 @@ def _plate_part(
     return mesh_part(h, error)
 
 
-def _limits(
-    air_limits: Callable[[Body], Iterator[Limit]], size: Callable[[Body], float], scene: Scene
-) -> Iterator[Limit]:
+def _limits(scene: Scene, *, held_air: bool, size: Callable[[Body], float]) -> Iterator[Limit]:
     body = scene.body
     if not body.of_kind.is_plate:
         yield Limit(why=f"needs a sheet, not a {body.kind}")
         return
     yield from limits.clamped_sheet_limits(body)
-    yield from air_limits(body)
+    yield from limits.edge_and_air_limits(body, held_air=held_air)
     yield from linear_elements.mesh_limits(body, size(body))
     if not scene.load.is_plain:
         yield limits.load_limit(scene)
@@ -335,7 +333,7 @@ REDUCED = register(
         method="large deflection, step by step from rest",
         words="a sheet that stretches as it bends, in its modes, from rest",
         solve=reduced_answer,
-        limits=partial(_limits, limits.held_air_limits, reduced_size),
+        limits=partial(_limits, held_air=True, size=reduced_size),
         parts=lambda scene, options: [
             mesh_part(options.h or 0.0, expected_error(scene.body, options.h or 0.0))
         ],
@@ -356,7 +354,7 @@ register(
         name="fem-nonlinear-transient",
         words="a sheet that stretches as it bends, on 10-node tetrahedra, step by step",
         solve=full_answer,
-        limits=partial(_limits, limits.vacuum_limits, full_size),
+        limits=partial(_limits, held_air=False, size=full_size),
         cost=_full_cost,
         default_size=full_size,
     )

@@ -14,7 +14,7 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import BODIES, Body, Layer, Phalanx
 from skinwave.bodies.build import build
 from skinwave.models import parametric
-from skinwave.models.free_keys import has_affine_operators, values_at
+from skinwave.models.free_keys import values_at
 from skinwave.models.free_keys import with_values as with_free_values
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import components, reduce_scene
@@ -98,7 +98,6 @@ def test_errors_of_missing_regions_list_those_of_the_file(body, finger):
 
 
 def test_materials_of_tissue_and_bone_can_be_varied(body):
-    assert has_affine_operators(body)
     tacton = Tacton(trajectory=Trajectory(shape="circle", size=0.006, speed=3.0))
     probes = ((0.0, 0.0), (3e-3, 2e-3))
     scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=probes)

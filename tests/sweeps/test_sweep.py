@@ -154,7 +154,7 @@ def test_bodies_of_many_materials_are_reduced_together(scene, monkeypatch, tmp_p
     assert together(rows) == {("done", 8)}
     assert all(0 < row["reduction_error"] < row["expected_error"] for row in rows)
     made.clear()
-    monkeypatch.setattr(covering, "FEWEST", 9)
+    monkeypatch.setitem(covering.FEWEST, "material", 9)
     alone = swept(MODULI, *ON_SMALL, out="alone")
     assert len(made) == 16
     assert together(alone) == {("done", 1)}
@@ -169,8 +169,8 @@ def test_bodies_of_many_materials_are_reduced_together(scene, monkeypatch, tmp_p
 )
 def test_factors_and_thicknesses_share_a_reduction(scene, monkeypatch, vary, kept):
     with monkeypatch.context() as patch:
-        patch.setattr(covering, "FEWEST", 3)
-        patch.setattr(covering, "FEWEST_OF_THICKNESS", 3)
+        for kind in covering.FEWEST:
+            patch.setitem(covering.FEWEST, kind, 3)
         rows = swept(vary, *ON_SMALL)
     assert together(rows) == {("done", 3)}
     alone = swept(vary, *ON_SMALL, out="alone")
@@ -212,7 +212,7 @@ def test_families_differ_only_in_free_keys_and_are_large():
 
 
 def test_bodies_are_reduced_alone_if_a_family_fails(scene, monkeypatch):
-    monkeypatch.setattr(covering, "FEWEST", 2)
+    monkeypatch.setitem(covering.FEWEST, "material", 2)
     moduli = "body.material.shear_modulus_pa=20e3,30e3"
 
     def refusing(*given, **options):
