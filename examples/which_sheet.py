@@ -35,7 +35,7 @@ from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.plates.modes import PlateModes, modal_motion, plate_modes
 from simple_model.plates.path_forces import modal_path_forces
 from skinwave.models.plate_modes import plate_of, relative_modulus
-from skinwave.results.claims import CLAIMS, MUCH_LOWER, rival_levels, strongest_rival
+from skinwave.results.claims import CLAIMS, LIMITS, rival_levels, strongest_rival
 from skinwave.results.run import Run
 from skinwave.scene.distributions import uniform
 from skinwave.scene.file import dumps, from_table
@@ -256,7 +256,7 @@ def nearest(rows: Sequence[Row]) -> list[Row]:
     """Return plausible sheets, those first that show most of M1 to M3, then those near M4, M5."""
     plausible = [r for r in rows if r["sag_over_thickness"] < PLAUSIBLE and isfinite(r["M5_value"])]
     shown = [-sum(row[f"{claim}_holds"] for claim in CLAIMED[:3]) for row in plausible]
-    beyond = [max(row["M4_value"], row["M5_value"] - MUCH_LOWER) for row in plausible]
+    beyond = [max(row["M4_value"], row["M5_value"] - LIMITS.much_lower) for row in plausible]
     return [plausible[k] for k in np.lexsort((beyond, shown))]
 
 

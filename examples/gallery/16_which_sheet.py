@@ -42,7 +42,7 @@ import numpy as np
 import skinwave
 
 sys.path.append(str(Path(skinwave.__file__).parents[1] / "examples"))
-from which_sheet import MUCH_LOWER, assess, findings, holds, hypercube
+from which_sheet import LIMITS, assess, findings, holds, hypercube
 
 small = [each for each in hypercube(200) if each["size"] == "A6"]
 rows = [assess(each) for each in small[:6]]
@@ -54,7 +54,7 @@ figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 part = 100 * np.arange(1, len(rows) + 1) / len(rows)
 for column, words, bar, colour in (
     ("M4_value", "strongest rival of f_AM", 0.0, "#0072B2"),
-    ("M5_value", "strongest multiple of f_AM or f_d", MUCH_LOWER, "#D55E00"),
+    ("M5_value", "strongest multiple of f_AM or f_d", LIMITS.much_lower, "#D55E00"),
 ):
     ax.step(np.sort([row[column] for row in rows]), part, where="post", label=words, c=colour)
     ax.axvline(bar, color=colour, ls=":", label=f"{column[:2]} holds below {bar:g} dB")

@@ -12,9 +12,7 @@ from simple_model.load.spectrum import load_lines
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
 
-SERIES_SHARE = 0.1  # of a waveform's tolerance: relative error of a series
 STRONG = 1e-2  # of the strongest line of a load: lines that a table must cover
-OCTAVE = 2.0  # factor below the first frequency of a table to which its series extends it
 
 
 def own_laws(body: Body) -> tuple[Material, ...]:
@@ -41,7 +39,8 @@ def check_laws(body: Body, pressure: MovingPressure) -> None:
         if isinstance(solid.law, ModulusTable):
             first, last = solid.law.frequencies[0], solid.law.frequencies[-1]
             lowest, highest = slowest_and_fastest(pressure)
-            if lowest < first / OCTAVE or highest > last * (1 + 1e-9):
+            # The series of a table extends it by an octave below its first frequency.
+            if lowest < first / 2 or highest > last * (1 + 1e-9):
                 raise ValueError(
                     f"the table of complex moduli covers {first:g} to {last:g} Hz, but strong "
                     f"lines of the load (above {100 * STRONG:g} % of the strongest) lie at "
@@ -58,7 +57,7 @@ def slowest_and_fastest(pressure: MovingPressure) -> tuple[float, float]:
 
 def series_tolerance(tolerance: float) -> float:
     """Return the relative error of a Prony series that a waveform's `tolerance` permits."""
-    return min(FIT_TOLERANCE, SERIES_SHARE * tolerance)
+    return min(FIT_TOLERANCE, 0.1 * tolerance)
 
 
 def relaxing(body: Body, tolerance: float) -> Body:

@@ -16,12 +16,18 @@ from skinwave.scene.scene import Scene
 from skinwave.system.table import Table
 from skinwave.typing import Floats
 
-# Levels in dB re f_AM.
-PRESENT = -60.0  # a line this weak is visible above a vibrometer's noise
-ABSENT = -120.0
-MUCH_LOWER = -20.0  # a tenth of the amplitude
-ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
-NO_PEAK = "a line that the claim is about has no spectral peak next to it"
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Limits by which claims are assessed: levels in dB re f_AM, and an offset in Hz."""
+
+    present: float = -60.0  # a line this weak is visible above a vibrometer's noise
+    absent: float = -120.0
+    much_lower: float = -20.0  # a tenth of the amplitude
+    on_bin: float = 1.0  # one bin of a spectrum of 1 s
+
+
+LIMITS = Limits()
 PAIRS = ("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM")
 
 
@@ -140,16 +146,27 @@ def is_resolved(run: NamedLines, claim: Claim) -> bool:
 def _single_line(runs: Sequence[NamedLines]) -> Assessment:
     worst = max(rival_levels(run).max() for run in runs)
     sentence = f"the strongest line other than f_AM is at {decibel(worst, signed=True)} dB re f_AM"
-    return worst < ABSENT, worst, ABSENT, sentence
+    return worst < LIMITS.absent, worst, LIMITS.absent, sentence
+
+
+def _lowest_levels(runs: Sequence[NamedLines], first: str, second: str) -> tuple[float, float, str]:
+    """Return the lowest levels of two lines, and both in words."""
+    one, two = (min(_strongest(run, [name]) for run in runs) for name in (first, second))
+    words = [name.replace("f", " f").strip() for name in (first, second)]
+    return (
+        one,
+        two,
+        (
+            f"the lowest level of {words[0]} is {decibel(one, signed=True)} dB re f_AM, that of "
+            f"{words[1]} {decibel(two, signed=True)} dB"
+        ),
+    )
 
 
 def _am_harmonics(runs: Sequence[NamedLines]) -> Assessment:
-    second = min(_strongest(run, ["2f_AM"]) for run in runs)
-    third = min(_strongest(run, ["3f_AM"]) for run in runs)
+    second, third, sentence = _lowest_levels(runs, "2f_AM", "3f_AM")
     weakest = min(second, third)
-    levels = f"{decibel(second, signed=True)} dB re f_AM, that of 3 f_AM"
-    sentence = f"the lowest level of 2 f_AM is {levels} {decibel(third, signed=True)} dB"
-    return weakest > PRESENT, weakest, PRESENT, sentence
+    return weakest > LIMITS.present, weakest, LIMITS.present, sentence
 
 
 def _drawing_lines(runs: Sequence[NamedLines]) -> Assessment:
@@ -158,22 +175,21 @@ def _drawing_lines(runs: Sequence[NamedLines]) -> Assessment:
         for run in runs
         for n in (1, 2, 3)
     )
-    sentence = f"the peaks at 1, 2 and 3 f_d deviate by {_bound(offset)}"
-    return offset <= ON_BIN, offset, ON_BIN, sentence if np.isfinite(offset) else NO_PEAK
+    return _on_bin(offset, f"the peaks at 1, 2 and 3 f_d deviate by {_bound(offset)}")
 
 
 def _same_places(runs: Sequence[NamedLines]) -> Assessment:
     names = ("f_d", "2f_d", "3f_d")
     places = np.array([[_peak(run, name) for name in names] for run in runs])
     if not np.isfinite(places).all():
-        return False, np.inf, ON_BIN, NO_PEAK
+        return _on_bin(np.inf, "")
     drift = float(np.ptp(places, axis=0).max())
     first = 20 * np.log10([run.lines["f_d"].max() for run in runs])
     sentence = (
         f"the lines of {len(runs)} paths lie within {drift:.2f} Hz of each other; "
         f"their f_d amplitudes differ by {np.ptp(first):.1f} dB"
     )
-    return drift <= ON_BIN, drift, ON_BIN, sentence
+    return _on_bin(drift, sentence)
 
 
 def _pairs_only(runs: Sequence[NamedLines]) -> Assessment:
@@ -183,17 +199,12 @@ def _pairs_only(runs: Sequence[NamedLines]) -> Assessment:
         f"the strongest line at n f_d is at {decibel(drawn, signed=True)} dB re f_AM, the weakest "
         f"of the pairs n f_d ± f_AM (n = 1, 2) at {decibel(weakest, signed=True)} dB"
     )
-    return drawn < ABSENT and weakest > PRESENT, drawn, ABSENT, sentence
+    return drawn < LIMITS.absent and weakest > LIMITS.present, drawn, LIMITS.absent, sentence
 
 
 def _both_multiples(runs: Sequence[NamedLines]) -> Assessment:
-    drawn = min(_strongest(run, ["f_d"], "f_AM") for run in runs)
-    double = min(_strongest(run, ["2f_AM"], "f_AM") for run in runs)
-    sentence = (
-        f"the lowest level of f_d is {decibel(drawn, signed=True)} dB re f_AM, that of 2 f_AM "
-        f"{decibel(double, signed=True)} dB"
-    )
-    return drawn > PRESENT, drawn, PRESENT, sentence
+    drawn, _, sentence = _lowest_levels(runs, "f_d", "2f_AM")
+    return drawn > LIMITS.present, drawn, LIMITS.present, sentence
 
 
 def _am_highest(runs: Sequence[NamedLines]) -> Assessment:
@@ -223,14 +234,14 @@ def _am_highest_measured(runs: Sequence[NamedLines]) -> Assessment:
 
 def _much_lower(runs: Sequence[NamedLines]) -> Assessment:
     levels = [multiple_levels(run).max() for run in runs]
-    value, lower = max(levels), sum(bool(level < MUCH_LOWER) for level in levels)
+    value, lower = max(levels), sum(bool(level < LIMITS.much_lower) for level in levels)
     sentence = (
         f"the strongest multiple of f_AM or f_d is at {decibel(value, signed=True)} dB re f_AM, "
-        f"and below {MUCH_LOWER:g} dB in {lower} of {plural(len(runs), 'Tacton')}"
+        f"and below {LIMITS.much_lower:g} dB in {lower} of {plural(len(runs), 'Tacton')}"
     )
-    if value < PRESENT:
+    if value < LIMITS.present:
         sentence += "; it is too weak to be visible"
-    return bool(PRESENT <= value < MUCH_LOWER), value, MUCH_LOWER, sentence
+    return bool(LIMITS.present <= value < LIMITS.much_lower), value, LIMITS.much_lower, sentence
 
 
 def _exact_frequencies(runs: Sequence[NamedLines]) -> Assessment:
@@ -241,7 +252,14 @@ def _exact_frequencies(runs: Sequence[NamedLines]) -> Assessment:
     ]
     worst = max(offsets)
     sentence = f"the spectral peaks deviate from the commanded f_AM and f_d by {_bound(worst)}"
-    return worst <= ON_BIN, worst, ON_BIN, sentence if np.isfinite(worst) else NO_PEAK
+    return _on_bin(worst, sentence)
+
+
+def _on_bin(offset: float, sentence: str) -> Assessment:
+    """Return whether an offset in Hz is at most a bin; without a peak the offset is infinite."""
+    if not np.isfinite(offset):
+        sentence = "a line that the claim is about has no spectral peak next to it"
+    return offset <= LIMITS.on_bin, offset, LIMITS.on_bin, sentence
 
 
 def _bound(offset: float) -> str:
@@ -297,7 +315,7 @@ def _probe_levels(
 def rivals(run: NamedLines) -> list[str]:
     """Return the names of the lines that are resolved from f_AM."""
     f_am = run.frequencies["f_AM"]
-    return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * ON_BIN]
+    return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * LIMITS.on_bin]
 
 
 def rival_levels(run: NamedLines, velocity: bool = False) -> Floats:

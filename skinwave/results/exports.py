@@ -14,7 +14,6 @@ from skinwave.results.views import View, field_frames
 from skinwave.system.table import Table
 
 PARAVIEW_ORDER = [0, 1, 2, 3, 5, 4]  # of the components of a tensor
-FULL_SCALE = 32767  # of 16-bit sound
 
 
 def write_probes(stem: Path, response: Response) -> None:
@@ -39,7 +38,7 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
 
     motion = response.values[:, probe] - response.values[:, probe].mean()
     largest = float(np.abs(motion).max())
-    samples = np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16)
+    samples = np.round(motion / (largest or 1.0) * 32767).astype(np.int16)
     plain_letters = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # for file names
     unit = response.record.shown.translate(plain_letters)
     x, y = 1e3 * response.probes[probe]
@@ -50,7 +49,7 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
 
 
 def write_field(folder: Path, view: View) -> Path:
-    """Write `column`.pvd with `FIELD_FRAMES` frames through a period, and return its path.
+    """Write `column`.pvd with the `field_frames` of a period, and return its path.
 
     Bodies are 10-node tetrahedra with `displacement_m` (n, 3). Solid bodies also have `strain` and
     `stress_pa` (n, 6), tension positive, in the order XX, YY, ZZ, XY, YZ, XZ; a node between two

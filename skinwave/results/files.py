@@ -18,7 +18,6 @@ from skinwave.scene.file import dumps
 from skinwave.system.table import Table
 
 DEPTH_COLUMN = "probe_depth_mm"  # only if a probe lies below the surface
-DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[\d¹²³]", re.IGNORECASE)  # on Windows
 
 
 def folder_name(name: str) -> str:
@@ -27,7 +26,8 @@ def folder_name(name: str) -> str:
     plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:longest_name]
     plain = plain.encode()[:most_bytes].decode(errors="ignore").strip()
     reserved = ("pictures", "propagation", "sensation")  # names of files and folders of pages
-    is_reserved = plain.casefold() in ("", *reserved) or DEVICES.fullmatch(plain)
+    devices = r"con|prn|aux|nul|(com|lpt)[\d¹²³]"  # on Windows
+    is_reserved = plain.casefold() in ("", *reserved) or re.fullmatch(devices, plain.casefold())
     return f"scene_{plain}" if is_reserved else plain
 
 

@@ -1,6 +1,6 @@
 """The part of a periodic pattern that an animation plays, and in how many frames."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -8,9 +8,20 @@ import numpy as np
 from simple_model import MovingPressure, Tacton, pattern_period
 from simple_model.load.tacton import repetition_frequencies
 
-FEWEST_FRAMES, MOST_FRAMES = 40, 256
-FRAMES_PER_PERIOD = 8  # of the fastest strong line
-SAME_PHASE = 1e-6  # of a turn for each turn: a smaller phase jump is round-off
+
+@dataclass(frozen=True, kw_only=True)
+class Frames:
+    """Numbers of frames of an animation: fewest, most, and those in a period of the fastest strong
+    line. Up to `same_phase` of a turn for each turn, a phase jump is round-off.
+    """
+
+    fewest: int = 40
+    most: int = 256
+    per_period: int = 8
+    same_phase: float = 1e-6
+
+
+FRAMES = Frames()
 
 
 def phase_jump(tacton: Tacton, span: float) -> float:
@@ -23,21 +34,22 @@ def whole_period(pressure: MovingPressure) -> float | None:
     """Return the period in s of the whole pattern, or None if it exceeds the duration."""
     whole = pattern_period(pressure.tacton)
     turns = whole * max(repetition_frequencies(pressure.tacton).values(), default=0.0)
-    return whole if turns and phase_jump(pressure.tacton, whole) <= SAME_PHASE * turns else None
+    is_closed = phase_jump(pressure.tacton, whole) <= FRAMES.same_phase * turns
+    return whole if turns and is_closed else None
 
 
 def played_part(
-    pressure: MovingPressure, fastest: float, frames: int | None = None, most: int = MOST_FRAMES
+    pressure: MovingPressure, fastest: float, frames: int | None = None
 ) -> tuple[float, int]:
     """Return the duration in s and the number of frames of an animation.
 
     The duration is the period of the whole pattern, or the time after which it nearly repeats. The
     number of frames follows from the `fastest` strong line in Hz, unless given. If this exceeds
-    `most`, only a part is played: that with the smallest phase jump.
+    the limit, only a part is played: that with the smallest phase jump.
     """
     span, tacton = pattern_period(pressure.tacton), pressure.tacton
-    needed = ceil(FRAMES_PER_PERIOD * fastest * span * (1 - SAME_PHASE))
-    if needed > (most := max(most, frames or 0)):
-        longest = min(tacton.duration, most / FRAMES_PER_PERIOD / fastest)
+    needed = ceil(FRAMES.per_period * fastest * span * (1 - FRAMES.same_phase))
+    if needed > (most := max(FRAMES.most, frames or 0)):
+        longest = min(tacton.duration, most / FRAMES.per_period / fastest)
         span, needed = pattern_period(replace(tacton, duration=longest)), most
-    return span, frames or max(needed, FEWEST_FRAMES)
+    return span, frames or max(needed, FRAMES.fewest)

@@ -32,24 +32,28 @@ from skinwave.models.reduced import read_at
 from skinwave.planning.deflection import stretches
 from skinwave.planning.errors import own_parts
 from skinwave.results.comparison import steady_lines as fitted_lines
-from skinwave.results.motion import (
-    REDUCTION_TOLERANCE,
-    BodyMotion,
-    reduced_motion,
-    reduced_motions,
-)
+from skinwave.results.motion import REDUCTION_TOLERANCE, BodyMotion, reduced_motion, reduced_motions
 from skinwave.scene.scene import Reading, Scene
 from skinwave.typing import Floats
 
-REACH, STEP = 0.044, 0.001  # m: half side of a map, and spacing of its places
-NEGLIGIBLE_LINE_RATIO = 1e-4  # to the load's strongest line: weaker lines do not show on a map
-LOWEST_LEVEL = -200.0  # dB, finite so that levels can be interpolated
-MAP_TOLERANCE = 0.1  # relative error of the reduced-order model of a map
-LOWEST_FREQUENCY = 1e-9  # Hz: a line below it is the mean
 OPTIONAL = ("level", "height")  # arrays that some maps have
 
 Lines = tuple[Floats, fem.Complex]  # frequencies (f,) in Hz, complex amplitudes (f, p)
 LinesAt = Callable[[Floats], Lines]  # places (p, 2) in m -> their lines
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapSettings:
+    """Extent and accuracy of maps."""
+
+    reach: float = 0.044  # m, half side of a map
+    step: float = 0.001  # m, spacing of its places
+    tolerance: float = 0.1  # relative error of the reduced-order model
+    weakest_line: float = 1e-4  # over the load's strongest: weaker lines do not show
+    lowest_level: float = -200.0  # dB, finite so that levels can be interpolated
+
+
+MAP = MapSettings()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +95,7 @@ class SurfaceField:
         return self.quantity.per_unit * self.rms
 
 
-def grid(scene: Scene, reach: float = REACH, step: float = STEP) -> tuple[Floats, Floats]:
+def grid(scene: Scene, reach: float = MAP.reach, step: float = MAP.step) -> tuple[Floats, Floats]:
     """Return coordinates (nx,) and (ny,) in m of a map about the origin, within the body."""
     body = scene.body
     sides = (body.width, body.height) if body.of_kind.is_bounded else (np.inf, np.inf)
@@ -112,12 +116,12 @@ def surface_lines(scene: Scene) -> LinesAt:
     if scene.reading.is_plain and takes(FROM_REST, scene):
         return partial(plate_lines, scene)
     body = compliance(scene.body)
-    return partial(steady_lines, body, scene.pressure, threshold=NEGLIGIBLE_LINE_RATIO)
+    return partial(steady_lines, body, scene.pressure, threshold=MAP.weakest_line)
 
 
 def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceField:
     """Return the map of the point kernel's pressure at x (nx,) and y (ny,) in m."""
-    lines_at = partial(pressure_lines, pressure, threshold=NEGLIGIBLE_LINE_RATIO)
+    lines_at = partial(pressure_lines, pressure, threshold=MAP.weakest_line)
     rms = _rms(PRESSURE, _interpolate(pressure, lines_at, x, y), len(x) * len(y))
     return SurfaceField(x=x, y=y, rms=rms.reshape(len(y), len(x)), quantity=PRESSURE)
 
@@ -151,7 +155,7 @@ def map_motions(
     body = scenes[0].body
     size = max(options.h or 0.0, map_size(body))
     return reduced_motions(
-        scenes, replace(options, tolerance=MAP_TOLERANCE, h=size), is_steady=True
+        scenes, replace(options, tolerance=MAP.tolerance, h=size), is_steady=True
     )
 
 
@@ -159,7 +163,7 @@ def _plate_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions) -> Sur
     """Return the map of a thin plate from its modes, linear if the model is or if that suffices."""
     places, model = _places(x, y), options.model
     is_given = model != "auto"
-    is_large = named(model).is_nonlinear if is_given else bool(stretches(scene, MAP_TOLERANCE))
+    is_large = named(model).is_nonlinear if is_given else bool(stretches(scene, MAP.tolerance))
     if not is_large:
         return _field(scene, x, y, partial(plate_lines, places=places), "thin plate")
     lines, note = stretching_lines(scene, options.tolerance)
@@ -177,7 +181,7 @@ def stretching_lines(scene: Scene, tolerance: float) -> tuple[LinesAt, str]:
     if found is None:
         a = 2 * np.fft.rfft(z, axis=0)[1:] / len(z)
         size = np.linalg.norm(a, axis=1)
-        shown = size > NEGLIGIBLE_LINE_RATIO * size.max(initial=0.0)
+        shown = size > MAP.weakest_line * size.max(initial=0.0)
         found = (1 + np.flatnonzero(shown)) / (len(z) * times[1]), a[shown]
         note += " from rest, with free vibration"
     f, amplitudes = found
@@ -214,7 +218,7 @@ def quantity_map(
         body, places = field_read(scene, scene.depths[0]), _places(x, y)
 
         def lines_of(scene: Scene) -> Lines:
-            return field_lines(body, scene.pressure, places, threshold=NEGLIGIBLE_LINE_RATIO)
+            return field_lines(body, scene.pressure, places, threshold=MAP.weakest_line)
 
         return _field(scene, x, y, lines_of, "wavenumber integral of the laterally infinite body")
     if options.h is None and scene.reading.is_plain and takes(FROM_REST, scene):
@@ -318,10 +322,10 @@ def _field(
     if has_level:
         steady = scene.during_pulses
         f, felt = lines if steady is scene else lines_of(steady)
-        moving = f > LOWEST_FREQUENCY
+        moving = f > 0
         amplitudes = np.abs(felt[moving]).reshape(int(moving.sum()), count)
         levels = sensation_level(amplitudes, f[moving, None])
-        values[1, where] = np.maximum(levels.max(axis=0, initial=-np.inf), LOWEST_LEVEL)
+        values[1, where] = np.maximum(levels.max(axis=0, initial=-np.inf), MAP.lowest_level)
     rms, level = values.reshape(2, len(y), len(x))
     return SurfaceField(
         x=x, y=y, rms=rms, level=level if has_level else None, quantity=quantity,
@@ -350,7 +354,7 @@ def _is_axisymmetric(pressure: MovingPressure) -> bool:
     path = pressure.tacton.trajectory
     if path.shape not in ("point", "circle") or any(path.centre):
         return False
-    lines = load_lines(pressure, NEGLIGIBLE_LINE_RATIO)
+    lines = load_lines(pressure, MAP.weakest_line)
     pairs = {(round(f, 6), n) for f, n in zip(lines.frequencies, lines.harmonics, strict=True)}
     return len(pairs) == len({f for f, _ in pairs})
 
@@ -360,7 +364,7 @@ def _rms(quantity: Quantity, lines: Lines, places: int) -> Floats:
     f, components = lines[0], int(np.prod(lines[1].shape[1:])) // max(places, 1)
     a = lines[1].reshape(len(f), places, components)
     if quantity.invariant is None:
-        return np.asarray(np.sqrt((np.abs(a[f > LOWEST_FREQUENCY, :, 0]) ** 2).sum(axis=0) / 2))
+        return np.asarray(np.sqrt((np.abs(a[f > 0, :, 0]) ** 2).sum(axis=0) / 2))
     return np.concatenate([*_invariant_rms(quantity, f, a)])
 
 

@@ -31,8 +31,6 @@ from skinwave.scene.scene import Scene
 from skinwave.system.json_kinds import fitting
 from skinwave.typing import Array, Floats, Ints
 
-KERNEL_GRID = 121  # points along a side of a flat surface
-FIELD_FRAMES = 8  # frames that are exported to other programs
 ARRAYS = ("points", "tets", "surface", "triangles", "times", "motion")
 # Shapes of the arrays in a file: numbers, names of lengths, or None for any length.
 SHAPES: dict[str, tuple[int | str | None, ...]] = {
@@ -108,11 +106,10 @@ class View:
         return int(np.abs(self.inward).max(axis=1).argmax())
 
 
-def fastest_line(moved: BodyMotion) -> float:
+def fastest_line(moved: BodyMotion, strong_line_ratio: float = 0.1) -> float:
     """Return the highest frequency in Hz that moves a body by a tenth of its largest or more."""
     lines, basis = oscillating(moved.motion), moved.own_basis
     power = np.einsum("fm,mn,fn->f", lines.lines.conj(), basis.T @ basis, lines.lines).real
-    strong_line_ratio = 0.1  # to the strongest line: weaker lines need no frames of their own
     strong = (power > 0) & (power >= strong_line_ratio**2 * power.max(initial=0.0))
     return float(lines.frequencies[strong].max(initial=0.0))
 
@@ -152,45 +149,48 @@ def with_shade(view: View, scene: Scene) -> View:
 
 
 def with_tensors(view: View) -> View:
-    """Return a view with strain and stress at `FIELD_FRAMES` of its times if the body is solid."""
+    """Return a view with strain and stress at its `field_frames` if the body is solid."""
     if view.moved is None or view.scene.body.of_kind.is_plate:
         return view
     return replace(view, tensors=tensors(view.moved, view.times, field_frames(len(view.times))))
 
 
-def field_frames(count: int) -> Ints:
-    """Return the indices (k,) of the exported frames."""
-    return np.unique(np.arange(FIELD_FRAMES) * count // FIELD_FRAMES)
+def field_frames(count: int, most: int = 8) -> Ints:
+    """Return the indices (k,) of the frames that are exported to other programs."""
+    return np.unique(np.arange(most) * count // most)
 
 
-def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int]) -> View:
-    """Return the point kernel's view on a flat rectangle of half sides `reach` (2,) in m."""
+def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int], side: int = 121) -> View:
+    """Return the point kernel's view on a flat rectangle of half sides `reach` (2,) in m, with
+    points along a `side`.
+    """
     pressure = scene.pressure
 
     def motion_at(places: Floats, t: Floats) -> Floats:
         f, lines = pressure_lines(pressure, places)
         return pressure(places, t) - lines[f == 0].real.sum(axis=0)
 
-    lines_at, shape = partial(pressure_lines, pressure), _grid(reach, KERNEL_GRID)
+    lines_at, shape = partial(pressure_lines, pressure), _grid(reach, side)
     view = _flat_view(scene, "none", SAME_LOAD.name, part, shape, lines_at, motion_at)
     return replace(view, quantity=PRESSURE)
 
 
-def flat_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
+def flat_view(
+    run: Run, reach: Floats, part: tuple[float, int], side: int = 81, tolerance: float = 0.05
+) -> View:
     """Return the view of a thin plate, or of a laterally infinite body on a flat rectangle.
 
-    `reach` and `part` are those of `kernel_view`.
+    `reach`, `part` and `side` are those of `kernel_view`. A sheet at large deflection moves within
+    the `tolerance`.
     """
     scene, body = run.scene, run.scene.body
-    layer_grid = 81  # points along a side of a flat surface
     if scene.reading.is_plain and takes(FROM_REST, scene):
-        points, triangles = _grid(np.array([body.width, body.height]) / 2, layer_grid)
+        points, triangles = _grid(np.array([body.width, body.height]) / 2, side)
         points[:, :2] += body.placement.offset
     else:
-        points, triangles = _grid(reach, layer_grid)
+        points, triangles = _grid(reach, side)
     is_large = run.model == STRETCHED.name
-    plate_tolerance = 0.05  # of the motion of a sheet at large deflection
-    lines_at = stretching_lines(scene, plate_tolerance)[0] if is_large else surface_lines(scene)
+    lines_at = stretching_lines(scene, tolerance)[0] if is_large else surface_lines(scene)
     return _flat_view(scene, run.body, run.model, part, (points, triangles), lines_at)
 
 
@@ -198,8 +198,7 @@ def _speed(scene: Scene, tone: float) -> float | None:
     body = scene.body
     if not body.of_kind.discretise:
         return None
-    typical_frequency = 140.0  # Hz, where nothing vibrates
-    return body.of_kind.wave_speed(body, tone or typical_frequency)
+    return body.of_kind.wave_speed(body, tone or 140.0)  # a typical frequency if nothing vibrates
 
 
 def _strongest_tone(frequencies: Floats, amplitudes: Floats) -> float:

@@ -33,7 +33,7 @@ from skinwave.models.reduced import components, reduce_scene
 from skinwave.planning.simulate import compute
 from skinwave.report.styles import SHOWN
 from skinwave.results.comparison import steady_rms
-from skinwave.results.surface import LOWEST_LEVEL, REACH, grid, has_wavenumber_integral
+from skinwave.results.surface import MAP, grid, has_wavenumber_integral
 from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, spreads_of
@@ -89,7 +89,7 @@ class Solution:
     lines : (f, p) float, amplitudes of the named lines
     rms : (p,) float
     level : (p,) float, dB, highest sensation level while a pulse is on, as if on skin, at least
-        `LOWEST_LEVEL`
+        `MAP.lowest_level`
     map_rms, map_level : (ny, nx) float, RMS and level on a map; empty without a map
     """
 
@@ -296,7 +296,7 @@ def waveform_times(scene: Scene) -> Floats:
 
 def map_axes(scene: Scene) -> tuple[Floats, Floats]:
     """Return the coordinates (nx,) and (ny,) in m of the map."""
-    return grid(scene, REACH, STEP)
+    return grid(scene, MAP.reach, STEP)
 
 
 def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solution:
@@ -389,4 +389,4 @@ def _amplitudes_at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats
 def _highest_level(frequencies: ArrayLike, lines: Complex | Floats) -> Floats:
     """Return the highest sensation level (p,) in dB of lines (f, p)."""
     levels = sensation_level(np.abs(lines), np.asarray(frequencies)[:, None])
-    return np.asarray(np.maximum(levels.max(axis=0, initial=-np.inf), LOWEST_LEVEL))
+    return np.asarray(np.maximum(levels.max(axis=0, initial=-np.inf), MAP.lowest_level))

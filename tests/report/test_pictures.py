@@ -137,7 +137,7 @@ def test_interpolation_leaves_out_triangles_seen_edge_on():
 def test_the_kernel_is_strongest_on_the_path(seen):
     view = seen["point-kernel"]
     radius = view.scene.tacton.trajectory.size / 2
-    step = np.ptp(view.places[:, 0]) / (views.KERNEL_GRID - 1)
+    step = np.ptp(view.places[:, 0]) / (121 - 1)
     brightest = view.places[view.inward.std(axis=0).argmax()]
     assert abs(np.hypot(*brightest) - radius) < 1.5 * step
     for t, frame in zip(view.times, np.abs(view.inward), strict=True):
@@ -154,7 +154,7 @@ def test_the_played_part_is_a_period_of_the_pattern():
     whole = circling(200.0, am_frequency=140)
     assert playback.played_part(whole, 340.0) == pytest.approx((0.05, 8 * 0.05 * 340))
     shortest = playback.played_part(circling(200.0), 200.0)
-    assert shortest == pytest.approx((0.005, playback.FEWEST_FRAMES))
+    assert shortest == pytest.approx((0.005, playback.FRAMES.fewest))
 
 
 def test_a_long_pattern_is_played_in_part():
@@ -162,16 +162,16 @@ def test_a_long_pattern_is_played_in_part():
     load = MovingPressure(tacton=long)
     assert playback.whole_period(load) == pytest.approx(2.0)
     span, frames = playback.played_part(load, 300.0)
-    assert frames == playback.MOST_FRAMES
-    assert frames / (span * 300.0) >= playback.FRAMES_PER_PERIOD
+    assert frames == playback.FRAMES.most
+    assert frames / (span * 300.0) >= playback.FRAMES.per_period
 
 
 def test_the_number_of_frames_follows_from_the_fastest_line(scene, moved):
     fastest = views.fastest_line(moved)
     view = views.body_view(scene, "skin-slab", moved)
     assert view.period == pytest.approx(0.01)
-    needed = round(playback.FRAMES_PER_PERIOD * fastest * view.period)
-    assert len(view.times) == max(playback.FEWEST_FRAMES, needed)
+    needed = round(playback.FRAMES.per_period * fastest * view.period)
+    assert len(view.times) == max(playback.FRAMES.fewest, needed)
     amplitude = np.abs(np.fft.rfft(view.inward, axis=0)).max(axis=1)
     strong = np.flatnonzero(amplitude > 0.1 * amplitude.max()) / view.period
     assert strong.max() <= 1.5 * fastest <= 1.5 * 800
@@ -343,7 +343,7 @@ def test_a_sound_has_the_scale_in_its_name(seen, page):
 def test_fields_are_opened_again_with_their_times(seen, page):
     pv = pytest.importorskip("pyvista")
     reader = pv.get_reader(str(page / "data/skin-slab.pvd"))
-    assert len(reader.time_values) == views.FIELD_FRAMES
+    assert len(reader.time_values) == 8
     reader.set_active_time_point(3)
     (grid,) = reader.read()
     view = seen["skin-slab"]
