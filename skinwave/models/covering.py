@@ -38,12 +38,9 @@ class Covering:
 
 
 def covering(
-    scene: Scene,
-    free: Mapping[str, tuple[float, float]],
-    members: int,
-    tolerance: float = 0.05,
+    scene: Scene, free: Mapping[str, tuple[float, float]], members: int, tolerance: float = 0.05,
     hardest: Body | None = None,
-) -> Covering | None:
+) -> Covering | None:  # fmt: skip
     """Return the bodies of a scene that share a reduction; None if separate reductions of `members`
     bodies cost less, or if the keys cannot be free.
 

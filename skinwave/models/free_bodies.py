@@ -49,11 +49,9 @@ class Range:
 
 
 def range_of(
-    body: Callable[[Sequence[float]], Body],
-    meshed: tuple[float, ...],
-    thicknesses: Sequence[bool],
-    h: float | None,
-) -> Range:
+    body: Callable[[Sequence[float]], Body], meshed: tuple[float, ...],
+    thicknesses: Sequence[bool], h: float | None,
+) -> Range:  # fmt: skip
     """Return the range of a function `body` of shares (k,), with the geometries between which
     matrices are interpolated; `thicknesses` (k,) marks shares of thicknesses. Raises a ValueError
     if no mesh can be moved over the range.

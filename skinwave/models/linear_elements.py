@@ -139,14 +139,9 @@ def transient_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
 
 
 def in_time(
-    stepped: Floats,
-    dt: float,
-    times: Floats,
-    scene: Scene,
-    solids: tuple[Material, ...] = (),
-    *,
+    stepped: Floats, dt: float, times: Floats, scene: Scene, solids: tuple[Material, ...] = (), *,
     sag: Floats | float = 0.0,
-) -> Floats:
+) -> Floats:  # fmt: skip
     """Return waveforms (t, p) of a scene's quantity at times (t,) in s, from `stepped` (n, p c),
     its components at rest in steps of dt from 0, and from `sag` (p c,), those under gravity. Rates
     are those of a cubic spline; stress relaxes in the p `solids` of the probes.
@@ -169,13 +164,10 @@ def sampled_components(
 
 
 def march(
-    balanced: Iterator[tuple[fem.State, fem.EnergyBalance]],
-    steps: int,
-    read: Callable[[Floats], Floats],
-    stored: Callable[[fem.State], float],
-    report: Progress,
+    balanced: Iterator[tuple[fem.State, fem.EnergyBalance]], steps: int,
+    read: Callable[[Floats], Floats], stored: Callable[[fem.State], float], report: Progress,
     check_every: int = 50,
-) -> tuple[Floats, tuple[float, float]]:
+) -> tuple[Floats, tuple[float, float]]:  # fmt: skip
     """Return readings (steps + 1, p) of the displacements (3 n,) in m of a time integration, and
     its last `energy_balance`; `stored` returns the energy in J of a state.
 
@@ -270,13 +262,9 @@ def _lines_solved(scene: Scene, options: SolveOptions) -> tuple[float, int]:
 
 
 def _line(
-    ops: fem.Operators,
-    P: sparse.csr_array,
-    S: sparse.csr_array,
-    solve: fem.LineSolver,
-    frequency: float,
-    pressure: fem.Complex,
-) -> tuple[fem.Complex, fem.EnergyBalance]:
+    ops: fem.Operators, P: sparse.csr_array, S: sparse.csr_array, solve: fem.LineSolver,
+    frequency: float, pressure: fem.Complex,
+) -> tuple[fem.Complex, fem.EnergyBalance]:  # fmt: skip
     """Return the probes' components (p c,) at rest of one line, and its power balance."""
     force, free = P @ pressure, ops.free
     u = solve(frequency, force)
@@ -285,12 +273,9 @@ def _line(
 
 
 def moved_line(
-    build: Build,
-    ops: fem.Operators,
-    S: sparse.csr_array,
-    solve: fem.LineSolver,
+    build: Build, ops: fem.Operators, S: sparse.csr_array, solve: fem.LineSolver,
     motion: SupportMotion,
-) -> tuple[fem.Complex, fem.EnergyBalance]:
+) -> tuple[fem.Complex, fem.EnergyBalance]:  # fmt: skip
     """Return the components (p c,) of a support's line, and the mean power balance."""
     force = sparse.csr_array(-meshed.inertia(build, motion.unit)[:, None])
     acceleration = np.array([motion.acceleration])

@@ -31,13 +31,9 @@ from skinwave.typing import Floats
 
 
 def mesh_body(
-    body: Body,
-    h: float | None,
-    clock: Clock,
-    report: Progress,
-    symmetry: str = "",
+    body: Body, h: float | None, clock: Clock, report: Progress, symmetry: str = "",
     discretise: Discretise | None = None,
-) -> Build:
+) -> Build:  # fmt: skip
     """Mesh a body with `bodies.build.build`, timed and reported."""
     with clock("mesh"), one_thread():
         report("mesh", 0.0)

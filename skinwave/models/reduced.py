@@ -105,14 +105,9 @@ class ReducedResponse:
 
 @underflow_to_zero()
 def reduce_scene(
-    scene: Scene,
-    options: SolveOptions = DEFAULT,
-    *,
-    symmetry: str = "",
-    reduction: float | None = None,
-    discretise: Discretise | None = None,
-    own_path: bool = False,
-) -> ReducedBody:
+    scene: Scene, options: SolveOptions = DEFAULT, *, symmetry: str = "",
+    reduction: float | None = None, discretise: Discretise | None = None, own_path: bool = False,
+) -> ReducedBody:  # fmt: skip
     """Mesh, assemble, factorise and reduce the body of a scene, once for all Tactons and, by the
     cache, once per machine.
 
@@ -183,21 +178,11 @@ def typical_spots(body: Body, points: Floats) -> Floats:
 
 
 def reduce_body(
-    body: Body,
-    build: Build,
-    operators: fem.Operators,
-    outputs: sparse.csr_array,
-    tolerance: float,
-    *,
-    surface: tuple[sparse.csr_array, Floats],
-    loads: Floats | None = None,
-    inertia: Floats | None = None,
-    solver: str = "auto",
-    report: Progress = silent,
-    from_loads: bool = False,
-    rate: int = 0,
-    band: float = DEFAULT.band,
-) -> tuple[ReducedBody, fem.ReducedModel]:
+    body: Body, build: Build, operators: fem.Operators, outputs: sparse.csr_array,
+    tolerance: float, *, surface: tuple[sparse.csr_array, Floats], loads: Floats | None = None,
+    inertia: Floats | None = None, solver: str = "auto", report: Progress = silent,
+    from_loads: bool = False, rate: int = 0, band: float = DEFAULT.band,
+) -> tuple[ReducedBody, fem.ReducedModel]:  # fmt: skip
     """Return the reduced body of a mesh and its operators, and its fem.ReducedModel with the basis.
 
     `outputs`, `loads`, `tolerance` and `solver` are as in `fem.reduce`; `surface` is the load
@@ -281,12 +266,9 @@ def respond(
 
 @underflow_to_zero()
 def answer(
-    reduced: ReducedBody,
-    scene: Scene,
-    progress: Progress | None = None,
-    *,
+    reduced: ReducedBody, scene: Scene, progress: Progress | None = None, *,
     times: Floats | None = None,
-) -> Response:
+) -> Response:  # fmt: skip
     """Return the response of a reduced body to the scene's Tacton from rest, at times (t,) in s
     equally spaced from 0, by default `sample_times`. Raises `fem.Diverged` if it violates the
     energy balance.

@@ -39,17 +39,10 @@ def cached_record(name: str, clock: Clock, make: Callable[[], T]) -> T:
 
 
 def cache_key(
-    body: Body,
-    build: Build,
-    probes: Floats,
-    solver: str,
-    tolerance: float,
-    *,
-    outputs: sparse.csr_array | None,
-    load: Load = PRESSURE,
-    path: str = "",
+    body: Body, build: Build, probes: Floats, solver: str, tolerance: float, *,
+    outputs: sparse.csr_array | None, load: Load = PRESSURE, path: str = "",
     band: float = DEFAULT.band,
-) -> str:
+) -> str:  # fmt: skip
     """Return the cache key of everything that a reduced body depends on; `outputs` (p c, 3 n) are
     None for normal motion at the surface.
     """

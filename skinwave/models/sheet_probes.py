@@ -57,14 +57,9 @@ def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> R
 
 
 def modal_reader(
-    body: Body,
-    build: Build,
-    modes: StretchingModes,
-    operators: fem.Operators,
-    probes: Floats,
-    reading: Reading,
-    solver: str,
-) -> Reader:
+    body: Body, build: Build, modes: StretchingModes, operators: fem.Operators, probes: Floats,
+    reading: Reading, solver: str,
+) -> Reader:  # fmt: skip
     """Return a function from coordinates (r,) of bending modes to components (p c,)."""
     quantity = reading.record
     if quantity.is_normal:

@@ -204,12 +204,9 @@ def _modal_force(
 
 
 def _from_rest(
-    motion: ReducedResponse,
-    rows: Floats,
-    times: Floats,
-    quantity: Quantity,
+    motion: ReducedResponse, rows: Floats, times: Floats, quantity: Quantity,
     solids: tuple[Material, ...],
-) -> Floats:
+) -> Floats:  # fmt: skip
     """Return the components (t, p c) of the linear part of the motion, exact for its modes."""
     components = reduced.in_motion(reduced.read_at(motion, rows), quantity, solids)
     below = below_half_the_rate(components.frequencies, times)

@@ -19,13 +19,9 @@ from skinwave.typing import Array
 
 
 def assess(
-    scene: Scene,
-    response: Response,
-    moved: ReducedBody | Array,
-    options: SolveOptions = DEFAULT,
-    *,
-    compared: ReducedBody | None = None,
-) -> Response:
+    scene: Scene, response: Response, moved: ReducedBody | Array, options: SolveOptions = DEFAULT,
+    *, compared: ReducedBody | None = None,
+) -> Response:  # fmt: skip
     """Return a response of linear elements with its expected error and all warnings.
 
     `moved` is the reduced body of the response, or the quantity of interest of another model:

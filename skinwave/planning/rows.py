@@ -16,14 +16,9 @@ from skinwave.scene.scene import Body, Scene
 
 
 def element_rows(
-    scene: Scene,
-    tolerance: float,
-    axes: str,
-    mesh: Refined,
-    highest: float,
-    h: float | None,
+    scene: Scene, tolerance: float, axes: str, mesh: Refined, highest: float, h: float | None,
     band: float,
-) -> list[PlanRow]:
+) -> list[PlanRow]:  # fmt: skip
     """Return the rows of elements: symmetry `axes`, size h, and a `band` and a line in Hz."""
     effort = mesh.prepared.effort
     return [
