@@ -20,7 +20,6 @@ from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.numbers import significant
 from simple_model.quantities import Quantity
 from skinwave.bodies.body import Body
-from skinwave.bodies.build import Build
 from skinwave.bodies.parts import PHALANX, PLAIN
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import Cost, Limit, Model, meshed, register
@@ -30,7 +29,6 @@ from skinwave.models.limits import edge_and_air_limits, of_body
 from skinwave.models.options import SolveOptions, response_of, solver_name
 from skinwave.models.reduced import answer, reduce_scene
 from skinwave.models.symmetry import even_part, images, modelled_axes
-from skinwave.scene.load import SupportMotion
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Clock, Progress
 from skinwave.typing import Floats
@@ -51,8 +49,13 @@ SOURCES = {
 def mesh_limits(body: Body, h: float | None = None) -> tuple[Limit, ...]:
     """Return the limits of elements of h in m, by default those of the body."""
     if not isfinite(body.depth):
+
+        def with_finite_depth(scene: Scene) -> Scene:
+            below = max(0.0, *scene.depths, *scene.body.interfaces[:-1])
+            return of_body(depth=finite_depth(below))(scene)
+
         why = "needs a body of finite depth, not thickness_mm = inf"
-        return (Limit(why=why, cure="set a finite thickness_mm", change=_with_finite_depth),)
+        return (Limit(why=why, cure="set a finite thickness_mm", change=with_finite_depth),)
     try:
         check_mesh(body, h or default_size(body))
     except ValueError as error:
@@ -63,11 +66,6 @@ def mesh_limits(body: Body, h: float | None = None) -> tuple[Limit, ...]:
     else:
         return ()
     return (Limit(why=f"cannot mesh this body: {why}", cure=cure, change=change),)
-
-
-def _with_finite_depth(scene: Scene) -> Scene:
-    below = max(0.0, *scene.depths, *scene.body.interfaces[:-1])
-    return of_body(depth=finite_depth(below))(scene)
 
 
 def finite_depth(below: float, more: float = 15e-3) -> float:
@@ -232,11 +230,14 @@ def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respo
             total += power
             report("lines", (k + 1) / len(frequencies))
         still = meshed.sag(build, ops, S, scene.load, solver)
-        if motion := scene.load.support_motion:
-            moved, power = moved_line(build, ops, S, solve, motion)
+        if support := scene.load.support_motion:
+            force = sparse.csr_array(-meshed.inertia(build, support.unit)[:, None])
+            acceleration = np.array([support.acceleration])
+            relative, power = _line(ops, force, S, solve, support.frequency, acceleration)
             total += power
-            frequencies = np.append(frequencies, motion.frequency)
-            amplitudes = np.vstack([amplitudes, moved])
+            shift = S @ meshed.translation(build, support.unit) * support.line
+            frequencies = np.append(frequencies, support.frequency)
+            amplitudes = np.vstack([amplitudes, relative + shift])
     imbalance, radiated = meshed.energy_balance(total)
     amplitudes = amplitudes * meshed.line_factor(
         quantity, 2j * np.pi * frequencies, solids, S.shape[0]
@@ -247,10 +248,8 @@ def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respo
         solver=solver_name(solver),
     )  # fmt: skip
     effort = meshed.with_cost(effort, clock, build, options.h or default_size(scene.body))
-    components = meshed.with_sag(
-        synthesise(frequencies[below], amplitudes[below], times), still, quantity
-    )
-    values = quantity.waveforms(components, len(scene.probes))
+    vibration = synthesise(frequencies[below], amplitudes[below], times)
+    values = quantity.waveforms(meshed.with_sag(vibration, still, quantity), len(scene.probes))
     return response_of(scene, "fem-harmonic", times, values, effort)
 
 
@@ -272,24 +271,11 @@ def _line(
     return S @ u, mean_power(ops.C, ops.R, *line, ops.branches)
 
 
-def moved_line(
-    build: Build, ops: fem.Operators, S: sparse.csr_array, solve: fem.LineSolver,
-    motion: SupportMotion,
-) -> tuple[fem.Complex, fem.EnergyBalance]:  # fmt: skip
-    """Return the components (p c,) of a support's line, and the mean power balance."""
-    force = sparse.csr_array(-meshed.inertia(build, motion.unit)[:, None])
-    acceleration = np.array([motion.acceleration])
-    relative, power = _line(ops, force, S, solve, motion.frequency, acceleration)
-    return relative + S @ meshed.translation(build, motion.unit) * motion.line, power
-
-
 def _reduced_cost(scene: Scene, options: SolveOptions, effort: Effort) -> Cost:
     """Return the measured cost of the reduced body, and that of a Tacton on it."""
     times, modes = computed_times(scene, options), effort.reduced_dofs
-    lines, outputs = (
-        lines_below(scene, times),
-        len(scene.probes) * (1 if scene.reading.record.is_normal else 6),
-    )
+    lines = lines_below(scene, times)
+    outputs = len(scene.probes) * (1 if scene.reading.record.is_normal else 6)
     positions = 100  # of the path
     driven = 2e-9 * lines * (modes + positions) * modes  # s of a line and two coordinates
     read = UNITS.exponential * len(times) * outputs * (lines + 2 * modes)

@@ -44,10 +44,24 @@ from skinwave.system.effort import Clock, Progress, peak_memory, silent
 from skinwave.typing import Bools, Floats
 
 
-def reduction_tolerance(tolerance: float, share: float = 1 / 15) -> float:
+@dataclass(frozen=True, kw_only=True)
+class ReductionAccuracy:
+    """Accuracy of reduced bodies."""
+
+    share: float = 1 / 15  # of the tolerance of a waveform, for the reduction
+    largest: float = 4e-3  # tolerance of a reduction, at most
+    series: float = 5.0  # times the latter: error of a Prony series, as in `series_tolerance`
+    path: float = 3.0  # times the latter: error of the load along a path
+    many_outputs: int = 24  # about as many as a load along one path has parts
+    weakest_line: float = 1e-7  # over the strongest line at the probes
+
+
+ACCURACY = ReductionAccuracy()
+
+
+def reduction_tolerance(tolerance: float) -> float:
     """Return the tolerance of a reduction, a small share of the waveform's."""
-    largest = 4e-3  # at most
-    return min(largest, share * tolerance)
+    return min(ACCURACY.largest, ACCURACY.share * tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,15 +134,13 @@ def reduce_scene(
     clock, report, solver = Clock(), options.progress, options.solver
     probes, reading, load = scene.probe_points, scene.reading, scene.load
     tolerance = reduction or reduction_tolerance(options.tolerance)
-    series_error = 5  # times that of the reduction, as in `series_tolerance`
-    body = relaxing(scene.body, series_error * tolerance)
+    body = relaxing(scene.body, ACCURACY.series * tolerance)
     symmetry = modelled_axes(body, probes, symmetry, reading, load)
     report("mesh", 0.0)
     build = meshed.mesh_body(body, options.h, clock, silent, symmetry, discretise)
     outputs, solids = meshed.probe_rows(body, build, images(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
-    many_outputs = 24  # about as many as a load along one path has parts
-    along = scene.loads[0] if own_path and outputs.shape[0] > many_outputs else None
+    along = scene.loads[0] if own_path and outputs.shape[0] > ACCURACY.many_outputs else None
     path, rate = (path_key(along), reading.record.rate) if along else ("", 0)
     name = cache_key(
         body, build, probes, solver, tolerance, outputs=own, load=load,
@@ -144,8 +156,7 @@ def reduce_scene(
             still = meshed.sag(build, operators, outputs, load, solver)
             loads = meshed.spread(P, typical_spots(body, points))
             if along:
-                path_share = 3  # of the tolerance: error of the load along a path
-                loads = path_loads(P, points, along, path_share * tolerance)
+                loads = path_loads(P, points, along, ACCURACY.path * tolerance)
             reduced, _ = reduce_body(
                 body, build, operators, outputs, tolerance, surface=(P, points), loads=loads,
                 inertia=meshed.inertia(build, support.unit) if support else None, solver=solver,
@@ -164,9 +175,8 @@ def path_loads(
     P: sparse.csr_array, points: Floats, pressure: MovingPressure, tolerance: float
 ) -> Floats:
     """Return nodal forces (3 n, s) that span the load along a path to a tolerance."""
-    return load_subspace(
-        meshed.spread(P, pressure.spot(points, path_samples(pressure)).T), tolerance
-    )
+    spots = pressure.spot(points, path_samples(pressure)).T
+    return load_subspace(meshed.spread(P, spots), tolerance)
 
 
 def typical_spots(body: Body, points: Floats) -> Floats:
@@ -232,8 +242,7 @@ def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Fl
     """Return distinct frequencies (f,) in Hz and reduced forces (f, r) of a load."""
     parts = np.split(reduced.forces, len(pressures))
     each = [
-        reduced_lines(pressure, reduced.points, part)
-        for pressure, part in zip(pressures, parts, strict=True)
+        reduced_lines(p, reduced.points, part) for p, part in zip(pressures, parts, strict=True)
     ]
     if support := reduced.load.support_motion:
         inertial = -support.acceleration * np.asarray(reduced.inertia)
@@ -287,25 +296,21 @@ def answer(
     times = sample_times(scene) if times is None else times
     if progress:
         progress("lines", 0.0)
-    negligible_line_ratio = 1e-7  # to the strongest line at the probes
     with clock("lines"):
         highest = highest_driving(scene.pressure, times)
         motion = components(reduced, *scene.loads, highest=highest)
         # The mean of an unconstrained body has no bound, so that lines are not compared with it.
         strength, is_mean = np.abs(motion.lines).max(axis=1), motion.frequencies == 0
         strongest = strength[~is_mean].max(initial=0.0)
-        chosen = is_mean | (strength > negligible_line_ratio * strongest)
+        chosen = is_mean | (strength > ACCURACY.weakest_line * strongest)
         chosen &= below_half_the_rate(motion.frequencies, times)
         vibration = from_rest(select_lines(motion, chosen), times)
         waveforms = meshed.with_sag(vibration, reduced.sag, quantity)
+    seconds = {**reduced.effort.seconds, **clock.seconds}
     effort = replace(
-        reduced.effort,
-        seconds={**reduced.effort.seconds, **clock.seconds},
-        steps=int(chosen.sum()),
-        energy_imbalance=motion.imbalance,
-        radiated=motion.radiated,
-        peak_memory=peak_memory(),
-    )
+        reduced.effort, seconds=seconds, steps=int(chosen.sum()), peak_memory=peak_memory(),
+        energy_imbalance=motion.imbalance, radiated=motion.radiated,
+    )  # fmt: skip
     return Response(
         model="fem", times=times, probes=reduced.probes, quantity=quantity.name,
         values=quantity.waveforms(waveforms, len(reduced.probes)), effort=effort,

@@ -93,12 +93,9 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
     """Return the full-order model of the meshed sheet at large displacement."""
     missing = membrane(body, made)
     return fem.finite_strain(
-        made.mesh,
-        made.material,
-        fixed=made.constraints,
+        made.mesh, made.material, fixed=made.constraints, tension=made.tension,
         membrane=missing if missing.thickness > 1e-9 * body.depth else None,
-        tension=made.tension,
-    )
+    )  # fmt: skip
 
 
 def full_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:

@@ -60,17 +60,14 @@ def coarser_body(
     return _reduced(without_tacton(scene), other, options.solver, options.tolerance)
 
 
-def all_warnings(
-    scene: Scene, response: Response, tolerance: float = 0.05, h: float | None = None
-) -> tuple[str, ...]:
+def all_warnings(scene: Scene, response: Response, h: float | None = None) -> tuple[str, ...]:
     """Return all warnings of a response without solving another mesh. For linear elements of h in m
     these are warnings that do not depend on their error, for other models those of the plan.
     """
     if named(response.model).default_size and h:
         warnings = errors.element_warnings(scene, h)
     else:
-        options = SolveOptions(tolerance=tolerance, model=response.model, times=response.times)
-        planned = plan(scene, options)
+        planned = plan(scene, SolveOptions(model=response.model, times=response.times))
         statement = planned.statement.with_parts(response.effort.errors.parts)
         warnings = (*statement.warnings, *planned.cautions)
     return (*warnings, *response_warnings(scene, response))

@@ -113,7 +113,7 @@ def _change(scene: Scene, spread: Spread) -> Floats:
     (f, centre), (f_low, low), (f_high, high) = lines
     if not (np.array_equal(f, f_low) and np.array_equal(f, f_high)):
         raise ValueError(f"lines of the load depend on {key}")
-    return relative_changes((high - low) / 2, centre)
+    return relative_changes((high - low)[f > 0] / 2, centre[f > 0])
 
 
 def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]]:
@@ -126,7 +126,7 @@ def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]]:
     if body.of_kind.is_plate:
         if not takes(MODES, scene):
             raise ValueError("the sheet has no modes of a flat plate")
-        return _lines_of_plate
+        return steady_lines_of_plate
     if body.of_kind.dispersion is None:
         raise ValueError(
             f"a {body.kind} has no flat layers; skinwave run --samples samples its elements"
@@ -136,31 +136,24 @@ def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]]:
     return _lines_of_layers
 
 
-def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
-    """Return frequencies (f,) in Hz above 0 and amplitudes (f, p) at the probes of flat layers."""
+def _lines_of_layers(scene: Scene, threshold: float = 1e-3) -> tuple[Floats, Complex]:
+    """Return frequencies (f,) in Hz and amplitudes (f, p) at the probes of flat layers."""
     pressure = replace(scene.pressure, profile="gaussian")
     compliance = layered(flat_layers(scene.body))
-    line_threshold = 1e-3  # of the load's strongest line
-    f, a = steady_lines(compliance, pressure, scene.probe_points, threshold=line_threshold)
-    return f[f > 0], a[f > 0]
+    return steady_lines(compliance, pressure, scene.probe_points, threshold=threshold)
 
 
-def _lines_of_plate(scene: Scene) -> tuple[Floats, Complex]:
-    """Return the same for a supported sheet, in the quantity of its probes."""
-    f, a = steady_lines_of_plate(scene)
-    return f[f > 0], a[f > 0]
-
-
-def mesh_row(scene: Scene, h: float | None, error: float) -> PlanRow:
-    """Return the row of the error budget of a response, with the finest mesh that is worthwhile."""
+def mesh_row(scene: Scene, h: float | None, error: float, enough: float = 0.1) -> PlanRow:
+    """Return the row of the error budget of a response, with the finest mesh that is worthwhile: a
+    numerical error below a share `enough` of the uncertainty gains nothing.
+    """
     budget = error_budget(scene, error)
     name, largest = budget.largest
     if not largest:
         return PlanRow(what="uncertainty", value=budget.spreads, reason="no spread is known")
-    enough = 0.1  # of the uncertainty: a smaller numerical error gains nothing
     reason = (
-        f"numerical errors below a tenth of that of the {name}, {change_text(enough * largest)}, "
-        "do not matter"
+        f"the uncertainty from the {name} ({change_text(largest)}) hides numerical errors below "
+        f"{change_text(enough * largest)}"
     )
     if h is not None and error > 0:
         coarsest = float(element_sizes(scene.body)[0])

@@ -53,15 +53,6 @@ class _Request:
     reason: str = REQUESTED
     start: float | None = None  # error of the start that the model leaves out, if known
 
-    @property
-    def tolerance(self) -> float:
-        return self.options.tolerance
-
-    def start_error(self) -> float:
-        """Return the error of the start that the model leaves out."""
-        known = self.start
-        return left_out.start_error(self.scene, self.model, self.grid) if known is None else known
-
     def model_row(self, start: float = 0.0, method: str = "") -> PlanRow:
         """Return the row of the model, with the relative error of the start if it is left out."""
         reason = f"{self.reason} ({method})" if method else self.reason
@@ -152,8 +143,7 @@ def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
     if moves and (not requested or requested.needs_body):
         check_laws(scene.body, scene.pressure)
     if not moves:
-        reason = "the scene has no body that moves"
-        model = requested or SAME_LOAD
+        model, reason = requested or SAME_LOAD, "the scene has no body that moves"
     elif requested:
         model, reason = requested, REQUESTED
     else:
@@ -180,8 +170,8 @@ def model_from_rest(scene: Scene, options: SolveOptions = DEFAULT) -> tuple[Mode
             f"thicknesses, and stretching changes its motion by {change_text(stretching)}"
         )
     reflections = side_reflections(scene)
-    waves_share = 0.8  # of the tolerance: largest reflections of sides that may be neglected
-    is_infinite = reflections <= waves_share * tolerance and takes(FLAT_BODY, scene)
+    # Reflections up to this share of the tolerance may be neglected.
+    is_infinite = reflections <= 0.8 * tolerance and takes(FLAT_BODY, scene)
     if is_infinite and (scene.body.of_kind.is_layer or _suffices(FLAT_BODY, scene, tolerance)):
         if scene.body.sides == "absorbing":
             return FLAT_BODY, "flat layers with absorbing sides, which need no mesh"
@@ -264,7 +254,9 @@ def _plan_without_mesh(request: _Request) -> tuple[Plan, list[ErrorPart]]:
     stretching stiffens the sheet and makes its waves longer.
     """
     scene, model, options = request.scene, request.model, request.options
-    start, size, highest = request.start_error(), 0.0, 0.0
+    start, size, highest = request.start, 0.0, 0.0
+    if start is None:
+        start = left_out.start_error(scene, model, request.grid)
     rows = [request.model_row(start, "" if model.is_infinite else model.method)]
     if model.default_size:
         size = options.h or model.default_size(scene.body)
@@ -272,13 +264,13 @@ def _plan_without_mesh(request: _Request) -> tuple[Plan, list[ErrorPart]]:
         reason = REQUESTED if options.h else f"the default of {model.name}"
         rows.append(PlanRow(what="element size", value=f"{1e3 * size:.2f} mm", reason=reason))
     if model.needs_body:
-        highest, line_row = _highest_line(scene, request.tolerance)
+        highest, line_row = _highest_line(scene, options.tolerance)
         rows = [line_row, *rows, *neglected_rows(scene, highest, model.is_nonlinear)]
     own = errors.own_parts(model, scene, replace(options, h=size or None))
     parts = [*own, *errors.start_parts(model, start)]
     if model.is_infinite:
         above = left_out.above_band_error(scene, model, request.grid)
-        parts += errors.sides_parts(scene, model, side_reflections(scene), request.tolerance)
+        parts += errors.sides_parts(scene, model, side_reflections(scene), options.tolerance)
         parts.append(errors.band_part(scene, TRANSFORM_RATE / 4, above))
     planned = Plan(
         model=model.name, body=scene.body, h=size or None, highest=highest, rows=tuple(rows)
@@ -288,8 +280,8 @@ def _plan_without_mesh(request: _Request) -> tuple[Plan, list[ErrorPart]]:
 
 def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
     """Plan linear elements: extent and mesh; and return the parts of their error."""
-    scene, model, tolerance = request.scene, request.model, request.tolerance
-    options, (times, _) = request.options, request.grid
+    scene, model, options, (times, _) = request.scene, request.model, request.options, request.grid
+    tolerance = options.tolerance
     highest, line_row = _highest_line(scene, tolerance)
     axes = symmetry(scene) if model.is_reduced else ""
     try:
@@ -329,10 +321,13 @@ def _plan_elements(request: _Request) -> tuple[Plan, list[ErrorPart]]:
     return planned, parts
 
 
-def _with_band(scene: Scene, options: SolveOptions, axes: str, times: Floats) -> SolveOptions:
-    """Return options with the band that has the motion of a scene on a coarse mesh."""
+def _with_band(
+    scene: Scene, options: SolveOptions, axes: str, times: Floats, widest: int = 4
+) -> SolveOptions:
+    """Return options with the band, up to `widest` times the usual one, that has the motion of a
+    scene on a coarse mesh: wide for a stiff body under a fast load.
+    """
     h = options.h or first_size(scene, element_sizes(scene.body), options.tolerance)
-    widest = 4  # times its usual band, for a reduced model of a stiff body under fast loads
     for band in (options.band * n for n in range(1, widest)):
         tried = replace(options, h=h, band=band)
         coarse = reduce_scene(scene, tried, symmetry=axes, own_path=True)

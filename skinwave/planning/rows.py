@@ -54,46 +54,38 @@ def cost_row(cost: Cost, effort: Effort | None) -> PlanRow:
 def _symmetry_row(scene: Scene, axes: str) -> PlanRow:
     among = mirrored_axes(scene.body, scene.reading, scene.load)
     on_plane = [a for a in axes_of_probes(scene.probe_points, among) if a not in axes]
-    reasons = []
-    if axes:
-        reasons.append(f"the load is symmetric across {' and '.join(axes)} = 0")
+    reasons = [f"the load is symmetric across {' and '.join(axes)} = 0"] if axes else []
     if on_plane:
-        reasons.append(
-            f"all probes lie on {' = '.join(on_plane)} = 0, where only the symmetric part of the "
-            "motion counts"
-        )
-    return PlanRow(
-        what="symmetry",
-        value=("none", "half", "a quarter")[len(axes) + len(on_plane)],
-        reason="; ".join(reasons) or "the whole body is modelled",
-    )
+        places = f"all probes lie on {' = '.join(on_plane)} = 0"
+        reasons.append(f"{places}, where only the symmetric part of the motion counts")
+    value = ("none", "half", "a quarter")[len(axes) + len(on_plane)]
+    reason = "; ".join(reasons) or "the whole body is modelled"
+    return PlanRow(what="symmetry", value=value, reason=reason)
 
 
 def _size_row(mesh: Refined, tolerance: float, h: float | None) -> PlanRow:
+    why = "the finest size that is tried"
     if h:
         why = "as requested"
     elif mesh.error <= tolerance:
         why = f"refined until the error is below {100 * tolerance:g} %"
-    else:
-        why = "the finest size that is tried"
-    reason = (
-        "the only mesh of the file, so its error is unknown"
-        if np.isinf(mesh.error)
-        else f"{why}; mesh error {change_text(mesh.error)}, by comparison with elements of "
-        f"{1e3 * mesh.compared:.2f} mm"
-    )
+    other = f"by comparison with elements of {1e3 * mesh.compared:.2f} mm"
+    reason = f"{why}; mesh error {change_text(mesh.error)}, {other}"
+    if np.isinf(mesh.error):
+        reason = "the only mesh of the file, so its error is unknown"
     size = f"{1e3 * mesh.h:.2f} mm, {mesh.prepared.effort.dofs:,} dofs"
     return PlanRow(what="element size", value=size, reason=reason)
 
 
-def coat_rows(body: Body, h: float) -> list[PlanRow]:
-    """Return the rows of the top layers: those in a coat, and those with elements."""
+def coat_rows(body: Body, h: float, stiff: float = 30.0) -> list[PlanRow]:
+    """Return the rows of the top layers: those in a coat, and those with elements. The error of a
+    coat is stated if it is `stiff` times as stiff as the layer below.
+    """
     shell = coat(body, h)
     coated = len(shell.materials) if shell else 0
     layers = list(zip(body.strata, thicknesses(body.strata), strict=True))[:-1]
     names = [f"{layer_name(body, solid)} of {1e3 * t:g} mm" for (_, solid), t in layers]
     rows = []
-    stiff_coat_ratio = 30.0  # to the modulus below, from where the error of a coat is stated
     if shell:
         reason = (
             f"a Kirchhoff shell on the surface, because it is thinner than half an element of "
@@ -101,7 +93,7 @@ def coat_rows(body: Body, h: float) -> list[PlanRow]:
         )
         below = body.strata[coated][1].shear_modulus
         ratio = max(solid.shear_modulus for solid in shell.materials) / below
-        if ratio >= stiff_coat_ratio:
+        if ratio >= stiff:
             reason += (
                 f"; it is {significant(ratio, 2)} times as stiff as the layer below: at 100 times, "
                 f"the error is at most 3{EN_DASH}15 % up to {COAT_FREQUENCY:g} Hz for thicknesses "
@@ -109,18 +101,11 @@ def coat_rows(body: Body, h: float) -> list[PlanRow]:
             )
         rows.append(PlanRow(what="coat", value=" and ".join(names[:coated]), reason=reason))
     if names[coated:]:
-        why = (
-            "elements may be as flat as layers"
-            if body.of_kind.conforming
-            else f"they are at least half an element of {1e3 * h:.3g} mm thick"
-        )
-        rows.append(
-            PlanRow(
-                what="layers",
-                value=" and ".join(names[coated:]),
-                reason=f"meshed with their own elements; {why}",
-            )
-        )
+        reason = "meshed with their own elements; elements may be as flat as layers"
+        if not body.of_kind.conforming:
+            thick = f"they are at least half an element of {1e3 * h:.3g} mm thick"
+            reason = f"meshed with their own elements; {thick}"
+        rows.append(PlanRow(what="layers", value=" and ".join(names[coated:]), reason=reason))
     return rows
 
 

@@ -156,14 +156,12 @@ def line_phasors(response: Response, frequencies: tuple[float, ...]) -> np.ndarr
     if not frequencies:
         return np.zeros((0, len(response.probes)), np.complex128)
     amplitudes = phasors(response, frequencies)
-    round_off = 1e-6  # of the largest RMS motion: weaker lines are round-off
-    return np.where(np.abs(amplitudes) > round_off * moving_rms(response).max(), amplitudes, 0)
+    return np.where(np.abs(amplitudes) > 1e-6 * moving_rms(response).max(), amplitudes, 0)
 
 
 def _is_strong(line: np.ndarray) -> np.ndarray:
-    size = np.abs(line)
-    lowest_phase_level = -20.0  # dB re a line's largest amplitude: below it a phase means little
-    return (size > 0) & (size >= 10 ** (lowest_phase_level / 20) * size.max(initial=0.0))
+    size = np.abs(line)  # 20 dB below the largest a phase means little
+    return (size > 0) & (size >= 0.1 * size.max(initial=0.0))
 
 
 def _align(reference: Response, candidate: Response) -> tuple[Floats, Floats]:

@@ -30,7 +30,7 @@ from skinwave.models.meshed import (
     surface_load,
     with_cost,
 )
-from skinwave.models.options import SolveOptions, sample_times
+from skinwave.models.options import SolveOptions, response_of, sample_times
 from skinwave.models.reduced import (
     ReducedResponse,
     from_rest,
@@ -166,12 +166,10 @@ def reduced_motions(
                 offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
                 radiated=motion.radiated,
             )  # fmt: skip
-            yield (
-                scene,
-                BodyMotion(
-                    build=build, basis=basis, motion=motion, in_pulses=in_pulses, effort=effort
-                ),
+            moved = BodyMotion(
+                build=build, basis=basis, motion=motion, in_pulses=in_pulses, effort=effort
             )
+            yield scene, moved
 
 
 def probe_lines(scene: Scene, moved: BodyMotion) -> ReducedResponse:
@@ -182,21 +180,18 @@ def probe_lines(scene: Scene, moved: BodyMotion) -> ReducedResponse:
 
 def probe_response(scene: Scene, moved: BodyMotion) -> Response:
     """Return the response at the probes, in their quantity."""
-    times, points, quantity = sample_times(scene), scene.probe_points, scene.reading.record
+    times = sample_times(scene)
     components = from_rest(probe_lines(scene, moved), times)
-    return Response(
-        model="fem", times=times, probes=points, quantity=quantity.name,
-        values=quantity.waveforms(components, len(points)), effort=moved.effort,
-    )  # fmt: skip
+    values = scene.reading.record.waveforms(components, len(scene.probes))
+    return response_of(scene, "fem", times, values, moved.effort)
 
 
-def check_values(frames: int, nodes: int) -> None:
-    """Raise a ValueError if the motion does not fit into memory."""
-    most_values = 500_000_000  # of the motion of a whole body, 4 GB
-    if (values := 3 * frames * nodes) > most_values:
+def check_values(frames: int, nodes: int, most: int = 500_000_000) -> None:
+    """Raise a ValueError if the motion has more values than fit into 4 GB."""
+    if (values := 3 * frames * nodes) > most:
         raise ValueError(
             f"the motion has {values:,} values ({frames:,} times of {nodes:,} nodes); the limit is "
-            f"{most_values:,}. Give fewer times or larger elements"
+            f"{most:,}. Give fewer times or larger elements"
         )
 
 

@@ -95,12 +95,10 @@ def propagation(
         )
     strongest, of_kernel = strongest_component(run), strongest_component(kernel)
     effect = Propagation(
-        column=run.column,
-        strongest=strongest,
-        kernel_strongest=of_kernel,
+        column=run.column, strongest=strongest, kernel_strongest=of_kernel,
         highest_sensation=strongest_component(run, by_sensation=True) if run.is_skin else None,
         delay=_delay(run, kernel, of_kernel.frequency) if strongest and of_kernel else None,
-    )
+    )  # fmt: skip
     if surface is None or kernel_surface is None or not np.nan_to_num(surface.rms).any():
         return effect
     distance, area = distance_along(run.scene, surface), area_of(surface)
@@ -140,9 +138,9 @@ def area_of(surface: SurfaceField) -> Floats:
     return np.asarray(np.sqrt(1 + sum(np.nan_to_num(slope) ** 2 for slope in slopes)))
 
 
-def distance_along(scene: Scene, surface: SurfaceField) -> Floats:
+def distance_along(scene: Scene, surface: SurfaceField, points: int = 24) -> Floats:
     """Return the distance (ny, nx) in m of the places of a map from the path of the focus, along
-    the surface above the straight line to the nearest place of the path.
+    the surface above `points` of the straight line to the nearest place of the path.
     """
     flat, nearest = _nearest(scene, surface.places)
     if surface.height is None:
@@ -152,10 +150,9 @@ def distance_along(scene: Scene, surface: SurfaceField) -> Floats:
     height = RegularGridInterpolator(
         (surface.x, surface.y), np.nan_to_num(surface.height.T), bounds_error=False, fill_value=None
     )
-    section = 24  # points of a line along a curved surface
-    shares = np.linspace(0, 1, section)[:, None, None, None]
+    shares = np.linspace(0, 1, points)[:, None, None, None]
     levels = height(surface.places + shares * (nearest - surface.places))
-    return np.asarray(np.hypot(flat / (section - 1), np.diff(levels, axis=0)).sum(axis=0))
+    return np.asarray(np.hypot(flat / (points - 1), np.diff(levels, axis=0)).sum(axis=0))
 
 
 def reach_of(inside: np.ndarray, distance: Floats) -> Reach:
@@ -195,19 +192,20 @@ def strongest_component(run: Run, *, by_sensation: bool = False) -> Component | 
         return None
     ranked = sensation_level(amplitudes, frequencies[:, None]) if by_sensation else amplitudes
     line, probe = np.unravel_index(int(np.argmax(ranked)), ranked.shape)
+    level = float(run.levels[names[line]][probe]) if names[line] in run.levels else None
     return Component(
-        name=names[line],
-        frequency=float(frequencies[line]),
+        name=names[line], frequency=float(frequencies[line]), probe=int(probe), level=level,
         amplitude=float(amplitudes[line, probe]),
-        probe=int(probe),
-        level=float(run.levels[names[line]][probe]) if names[line] in run.levels else None,
-    )
+    )  # fmt: skip
 
 
-def added_lines(kernel: Run, published: Run) -> list[str]:
-    """Return the lines that drive law and focus add to the published load, the strongest first."""
+def added_lines(
+    kernel: Run, published: Run, present: float = -40.0, absent: float = -100.0
+) -> list[str]:
+    """Return the lines that drive law and focus add to the published load, the strongest first:
+    they are `present` and were `absent`, in dB re the strongest line of the same response.
+    """
     levels, published_levels = _levels(kernel), _levels(published)
-    present, absent = -40.0, -100.0  # dB re the strongest component of the same response
     added = (
         name for name, level in levels.items()
         if level > present and published_levels.get(name, -np.inf) < absent
