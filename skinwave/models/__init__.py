@@ -144,13 +144,7 @@ MODELS = Registry[Model](
 
 
 def register(model: Model) -> Model:
-    """Register a model under its name.
-
-    Raises
-    ------
-    ValueError
-        If the name is taken.
-    """
+    """Register a model under its name; raises a ValueError if the name is taken."""
     from skinwave.models.options import underflow_to_zero
 
     model = replace(model, solve=underflow_to_zero()(model.solve))
@@ -164,11 +158,5 @@ def names() -> tuple[str, ...]:
 
 
 def named(name: str) -> Model:
-    """Return the model with a name.
-
-    Raises
-    ------
-    ValueError
-        If the name is unknown.
-    """
+    """Return the model with a name; raises a ValueError if the name is unknown."""
     return extensions.find(MODELS, name)

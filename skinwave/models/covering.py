@@ -22,9 +22,8 @@ FEWEST = {"material": 6, "thickness": 15}
 
 @dataclass(frozen=True, kw_only=True)
 class Covering:
-    """Bodies that share a reduced-order model: those of a `scene` with free keys within `ranges`,
-    (key, lowest value, highest value). `members` is their number, and `hardest` the body with the
-    shortest waves.
+    """Bodies that share a reduced-order model: `members` of them, those of a `scene` with free keys
+    within `ranges` (key, lowest, highest value). The `hardest` has the shortest waves.
     """
 
     scene: Scene
@@ -44,9 +43,8 @@ def covering(
     """Return the bodies of a scene that share a reduction; None if separate reductions of `members`
     bodies cost less, or if the keys cannot be free.
 
-    `free` has the lowest and highest value of each key, in the unit of the file. `tolerance` is the
-    relative error of responses. `hardest` is the body with the shortest waves, by default that of
-    the scene.
+    `free` has the lowest and highest value of each key, in the unit of the file. The `hardest`
+    body, with the shortest waves, is that of the scene by default.
     """
     plain = replace(scene, spreads=())
     try:

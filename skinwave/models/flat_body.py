@@ -42,8 +42,8 @@ METHOD = "wavenumber integral"
 
 
 def _solver(model: str, normal: Callable[..., Response], history: Callable[..., Floats]) -> Solve:
-    """Return the function that solves a scene: with `normal` for normal displacement under a
-    pressure, otherwise with the `history` of components at the probes of each depth.
+    """Return the function that solves a scene: by `normal` for normal displacement under a
+    pressure, otherwise by the `history` of components at the probes of each depth.
     """
 
     def solve(scene: Scene, times: Floats, options: SolveOptions) -> Response:
@@ -95,9 +95,7 @@ def _parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
 
 
 def _effect_of_shear(scene: Scene, longest: float = 0.1) -> float:
-    """Return the relative change of a sheet's motion by shear and rotary inertia, in the first
-    part of a response, at most `longest` s.
-    """
+    """Return the change of a sheet's motion by shear and rotary inertia, in `longest` s or less."""
     times = sample_times(scene)
     times = times[: max(2, int(np.searchsorted(times, longest)))]
     thin, thick = (

@@ -110,8 +110,8 @@ def _terms(body: Body) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reference:
-    """Meshed body: the `parts` (r,) with its materials, factors (r, 2) on modulus and density if
-    its mesh represents a thinner body, and whether it rests on springs that scale with its modulus.
+    """Meshed body, with the `parts` (r,) of its materials and factors (r, 2) on modulus and density
+    if its mesh represents a thinner body. `is_sprung` if its springs scale with its modulus.
     """
 
     body: Body

@@ -38,8 +38,8 @@ Part = int | str | None  # of a body: a layer, a region by its name, or the rest
 @dataclass(frozen=True, kw_only=True)
 class FreeKey:
     """Number of a body that is free from `low` to `high`: its `key` in a scene file, the `part` of
-    the body, its `path` (in the material's table, or one of `SCALES`, or `THICKNESS`), and whether
-    the mesh `moves` with it.
+    the body, and its `path` (in the material's table, one of `SCALES`, or `THICKNESS`). The mesh
+    `moves` with some thicknesses.
     """
 
     key: str
@@ -125,8 +125,8 @@ def training_shares(count: int, inside: int, most_corners: int = 16) -> Floats:
 
 def meshing_shares(keys: Sequence[FreeKey]) -> tuple[float, ...]:
     """Return the shares (k,) of the ranges at which the body is meshed: the largest thicknesses,
-    and the fastest shear waves below all layers, for which an absorbing layer is widest. Layers
-    with equal ranges get different shares, so that they are not merged.
+    and the fastest shear waves below all layers, where an absorbing layer is widest. Layers with
+    equal ranges get different shares, so that they are not merged.
     """
     fastest = {"shear_modulus_pa": 1.0, MODULI: 1.0, "density_kg_m3": 0.0}
     inside = [0.4 + 0.2 * k / len(keys) for k in range(len(keys))]

@@ -31,8 +31,8 @@ def has_table(body: Body) -> bool:
 
 
 def check_laws(body: Body, pressure: MovingPressure) -> None:
-    """Raise a ValueError for a modulus law that is not passive or not causal, or a table that ends
-    below the highest strong line of the load or begins an octave above the lowest, mean ignored.
+    """Raise a ValueError if a modulus law is not passive or not causal, or if a table does not
+    cover the strong lines of the load: from an octave below its first frequency up to its last one.
     """
     for solid in own_laws(body):
         solid.series()

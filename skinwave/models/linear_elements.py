@@ -140,9 +140,10 @@ def in_time(
     stepped: Floats, dt: float, times: Floats, scene: Scene, solids: tuple[Material, ...] = (), *,
     sag: Floats | float = 0.0,
 ) -> Floats:  # fmt: skip
-    """Return waveforms (t, p) of a scene's quantity at times (t,) in s, from `stepped` (n, p c),
-    its components at rest in steps of dt from 0, and from `sag` (p c,), those under gravity. Rates
-    are those of a cubic spline; stress relaxes in the p `solids` of the probes.
+    """Return waveforms (t, p) of a scene's quantity at times (t,) in s.
+
+    `stepped` (n, p c) are its static components in steps of dt from 0, and `sag` (p c,) those under
+    gravity. A cubic spline gives the rates. Stress relaxes in the p `solids` of the probes.
     """
     quantity = scene.reading.record
     sampled = sampled_components(stepped, dt, times, quantity, solids)
@@ -167,9 +168,8 @@ def march(
     check_every: int = 50,
 ) -> tuple[Floats, tuple[float, float]]:  # fmt: skip
     """Return readings (steps + 1, p) of the displacements (3 n,) in m of a time integration, and
-    its last `energy_balance`; `stored` returns the energy in J of a state.
-
-    Raises `fem.Diverged` if a checked state violates the balance.
+    its last `energy_balance`; `stored` returns the energy in J of a state. Raises `fem.Diverged` if
+    a checked state violates the balance.
     """
     readings = []
     for k, (state, energies) in enumerate(balanced):
@@ -182,9 +182,7 @@ def march(
 
 
 def step_count(duration: float, dt: float, most: int = 1_000_000) -> int:
-    """Return the number of steps of dt in a duration in s; raises a ValueError above `most`, five
-    times the steps of the longest Tacton.
-    """
+    """Return the number of steps of dt in a duration in s; raises a ValueError above `most`."""
     if dt > duration:
         raise ValueError(
             f"dt = {dt:g} s is longer than the response, {duration:g} s; use a shorter step"
@@ -198,9 +196,8 @@ def step_count(duration: float, dt: float, most: int = 1_000_000) -> int:
 
 
 def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """Solve the steady state with one factorisation for each line of the load above a threshold,
-    without the mean if the body is unconstrained. If all probes lie on a symmetry plane of the
-    body, only one half is modelled.
+    """Solve the steady state with one factorisation for each strong line of the load, without the
+    mean if the body is unconstrained. If all probes lie on a symmetry plane, one half is modelled.
     """
     report, solver, most_lines = options.progress, options.solver, 1000  # each a factorisation
     threshold, count = _lines_solved(scene, options)

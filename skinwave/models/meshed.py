@@ -50,8 +50,8 @@ def assemble(build: Build, clock: Clock, report: Progress) -> fem.Operators:
 def energy_balance(
     energies: fem.EnergyBalance, stored: float = 0.0, when: str = ""
 ) -> tuple[float, float]:
-    """Return the relative error of an energy or power balance, with the energy in J `stored` at its
-    end, and the radiated share of the losses. Raises `fem.Diverged` if the error is too large.
+    """Return the relative error of an energy or power balance, given the energy in J `stored` at
+    its end, and the radiated share of the losses. Raises `fem.Diverged` if the error is too large.
     """
     imbalance = fem.imbalance(energies, stored)
     most_imbalance = 0.01  # relative error of the energy balance, above which a response is refused
@@ -77,12 +77,11 @@ def expansion_point(
     body: Body, build: Build, *, per_crossing: float = 3.8,
     within: tuple[float, float] = (2 * np.pi * 50.0, 2 * np.pi * 1000.0),
 ) -> float:  # fmt: skip
-    """Return the expansion point in rad/s, `within` bounds, with which a body's reduced model needs
-    few vectors.
+    """Return the expansion point in rad/s with which a body's reduced model needs few vectors.
 
     The lowest natural frequency of tissue on bone follows the time in which shear waves cross the
-    mean depth, the volume over the area of the top seen from above. `per_crossing` is the point
-    times this time. The best one of palms, slabs, a fingertip and a hand is 0.7 to 1.6 times it.
+    mean depth, which is volume over top area seen from above. The point is `per_crossing` over this
+    time; the best one of palms, slabs, a fingertip and a hand is 0.7 to 1.6 times it.
     """
     if body.of_kind.is_plate:
         return EXPANSION_POINT
@@ -179,8 +178,7 @@ def with_sag(components: Floats, sag: Floats | float, quantity: Quantity) -> Flo
 
 
 def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array:
-    """Return the probe operator S (p, 3 n) of the displacement into a meshed body at probes (p, 2)
-    in m.
+    """Return the probe operator S (p, 3 n) of the displacement into a body at probes (p, 2) in m.
 
     The surface of a file consists of flat triangles, whose normals jump at edges. There the
     direction into the body is that of the mean normal around a probe.
@@ -191,8 +189,8 @@ def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array
 def probe_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
-    """Return the probe operator S (p c, 3 n) of the c components of a quantity at rest at probes
-    (p, 2) in m, and the material at each probe, or () if the quantity does not depend on it.
+    """Return the probe operator S (p c, 3 n) of the c static components of a quantity at probes (p,
+    2) in m, and the material at each probe, or () if the quantity does not depend on it.
 
     Raises a ValueError if a probe is outside the body, or reads strain or stress in a coat.
     """

@@ -81,9 +81,8 @@ Solve = Callable[[Scene, Floats, SolveOptions], Response]
 
 @contextmanager
 def underflow_to_zero() -> Iterator[None]:
-    """Round underflow to 0 even if the caller lets NumPy raise it: decaying exponentials end in 0.
-
-    It decorates the entries of all computing: plans, reductions and the `solve` of models.
+    """Round underflow to 0, where exponentials end, even if the caller lets NumPy raise it. It
+    decorates the entries of all computing: plans, reductions and the `solve` of models.
     """
     with np.errstate(under="ignore"):
         yield

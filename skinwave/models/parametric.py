@@ -167,8 +167,8 @@ def _range(body: Body, keys: tuple[FreeKey, ...], h: float | None) -> Range:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Stage:
-    """Offline stage of a scene; `mesh` returns the mesh at shares of the range. The `tolerance` is
-    one of the reduced-order model and one of the bases of lines.
+    """Offline stage of a scene. `mesh` returns the mesh at shares of the range; the `tolerance`
+    applies to the reduced-order model and to the bases of lines.
     """
 
     scene: Scene

@@ -151,8 +151,7 @@ def _solver(model: str, motion: Callable[[Scene, Driven, Floats], Floats]) -> So
 @one_thread()
 def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Complex]:
     """Return frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity in the
-    steady state, at places (p, 2) in m or at its probes. Raises a ValueError if the load has no
-    lines.
+    steady state, at places (p, 2) in m or at its probes. Raises a ValueError if there are no lines.
     """
     driven = _drive(scene, sample_times(scene))
     if places is not None:
@@ -177,9 +176,7 @@ def thin_plate_part(scene: Scene) -> ErrorPart:
 
 
 def thick_mesh_part(scene: Scene) -> Iterator[ErrorPart]:
-    """Yield the part due to the shear and rotary inertia that a mesh has because it is thicker
-    than its sheet.
-    """
+    """Yield the part due to shear and rotary inertia of a mesh that is thicker than its sheet."""
     thickness = equivalent(scene.body)
     if thickness <= scene.body.depth or not takes(FROM_REST, scene):
         return
@@ -234,9 +231,7 @@ def _effect_of(
 
 @lru_cache(maxsize=2)
 def _uncoupled(scene: Scene, samples: int) -> tuple[Driven, Floats]:
-    """Return the motion from rest (t, p) without coupling between modes, and its modes, under the
-    lines that matter.
-    """
+    """Return the motion from rest (t, p) under strong lines, and its modes, without coupling."""
     times = sample_times(scene)[:samples]
     driven = _drive(scene, times)
     sizes = np.linalg.norm(driven.motion, axis=1)
@@ -488,9 +483,7 @@ def solve_stretching(
 
 
 def _step_count(times: Floats, longest: float) -> int:
-    """Return the number of equal steps that end at the last of times (t,) in s. Twice as long ones
-    are enough for a spline.
-    """
+    """Return the number of equal steps up to the last of times (t,) in s, enough for a spline."""
     return max(2 * ACCURACY.degree, ceil(times[-1] / longest - 1e-6))
 
 
@@ -501,9 +494,7 @@ def steps_part(source: str, error: float, more: str = "") -> ErrorPart:
 
 
 def _planned_parts(scene: Scene, options: SolveOptions) -> Iterator[ErrorPart]:
-    """Yield the parts of a sheet that stretches, with the error at which steps and modes suffice,
-    which the response replaces by its own.
-    """
+    """Yield planned parts of a sheet that stretches; the response replaces the last by its own."""
     yield from (RITZ_ERROR, thin_plate_part(scene))
     yield steps_part("modes that stretch, in time steps", ACCURACY.share * options.tolerance)
 
@@ -517,8 +508,8 @@ def stretching_in_run(scene: Scene, times: Floats, run: Run) -> Floats:
 
 
 def _at(values: Floats, times: Floats, rate: int = 0) -> Floats:
-    """Return values (t, p) at times (t,) in s, or their derivatives of order `rate`, from those (n,
-    p) after equal steps to the last time.
+    """Return values (t, p) at times (t,) in s, or their derivatives of order `rate`, from values
+    (n, p) after equal steps to the last time.
     """
     if len(values) == len(times) and not rate:
         return values

@@ -122,14 +122,13 @@ def reduce_scene(
     scene: Scene, options: SolveOptions = DEFAULT, *, symmetry: str = "",
     reduction: float | None = None, discretise: Discretise | None = None, own_path: bool = False,
 ) -> ReducedBody:  # fmt: skip
-    """Mesh, assemble, factorise and reduce the body of a scene, once for all Tactons and, by the
-    cache, once per machine.
+    """Mesh, assemble, factorise and reduce the body of a scene, once per machine for all Tactons.
 
-    If all probes lie on a symmetry plane of the body, one half is modelled. `symmetry`, the axes
-    across which all loads are symmetric, applies to normal motion under a pressure. `reduction` is
-    the relative error of the reduction, by default `reduction_tolerance` of the options, and
-    `discretise` replaces the mesh of the body's kind. With `own_path`, a body with many outputs is
-    reduced for the path of the scene's focus only.
+    If all probes lie on a symmetry plane of the body, one half is modelled. `symmetry` has the axes
+    across which all loads are symmetric, for normal motion under a pressure. `reduction` is the
+    relative error of the reduction, by default `reduction_tolerance` of the options. `discretise`
+    replaces the mesh of the body's kind. With `own_path`, a body with many outputs is reduced for
+    the path of the scene's focus only.
     """
     clock, report, solver = Clock(), options.progress, options.solver
     probes, reading, load = scene.probe_points, scene.reading, scene.load
@@ -278,9 +277,8 @@ def answer(
     reduced: ReducedBody, scene: Scene, progress: Progress | None = None, *,
     times: Floats | None = None,
 ) -> Response:  # fmt: skip
-    """Return the response of a reduced body to the scene's Tacton from rest, at times (t,) in s
-    equally spaced from 0, by default `sample_times`. Raises `fem.Diverged` if it violates the
-    energy balance.
+    """Return the response of a reduced body from rest to the scene's Tacton, at times (t,) in s
+    equally spaced from 0. Raises `fem.Diverged` if it violates the energy balance.
     """
     if scene.load.moving != reduced.load.moving:
         raise ValueError(

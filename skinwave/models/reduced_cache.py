@@ -23,9 +23,7 @@ T = TypeVar("T")
 
 
 def cached_record(name: str, clock: Clock, make: Callable[[], T]) -> T:
-    """Return the record cached under a name; otherwise make it, and cache it if all numbers of its
-    arrays are finite.
-    """
+    """Return the record cached under a name, or make and cache it if all its numbers are finite."""
     record = None
     other_version = suppress(ImportError, KeyError, TypeError, ValueError)  # of skinwave
     with clock("read from cache"), other_version:

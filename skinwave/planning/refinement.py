@@ -93,8 +93,8 @@ class SizeController:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refined:
-    """Refined mesh: its element size `h` in m, its expected relative `error` from `mesh_error`, the
-    size in m that it was `compared` with, and its reduced body.
+    """Refined mesh: its size `h` in m, its expected relative `error` from `mesh_error`, the size in
+    m that it was `compared` with, and its reduced body.
     """
 
     h: float
@@ -106,10 +106,9 @@ class Refined:
 def refine(
     scene: Scene, body: Body, options: SolveOptions = DEFAULT, *, symmetry: str = ""
 ) -> Refined:
-    """Return the coarsest mesh of a sequence that meets the tolerance, the finest mesh if none
-    does, or the mesh of a given h. `body` is the scene's body or a part of it.
-
-    Raises a ValueError if the body has no mesh of that size.
+    """Return the coarsest mesh of a sequence that meets the tolerance, the finest if none does, or
+    the mesh of a given h. `body` is the scene's body or a part of it. Raises a ValueError if the
+    body has no mesh of that size.
     """
     h, tolerance, meshed = options.h, options.tolerance, replace(scene, body=body)
 
@@ -171,9 +170,8 @@ def controller(scene: Scene) -> SizeController:
 
 def first_size(scene: Scene, sizes: Floats, tolerance: float) -> float:
     """Return the size in m, out of a sequence, that usually meets a tolerance, but not the first.
-
-    Default sizes follow the focal spot, depth and layers of a body, so that true errors of most
-    random bodies were within a factor of 3 of those that they suggest.
+    The true errors of most random bodies were within a factor of 3 of those that this size
+    suggests.
     """
     own = controller(scene)
     wanted = own.size(default_size(scene.body), own.at_default, tolerance)
@@ -299,7 +297,7 @@ def above_band(waveforms: Floats, step: float, band: float = DEFAULT.band) -> fl
 
 def mesh_error(scene: Scene, ratio: float, quantities: tuple[Array, Array]) -> float:
     """Return the error of the second of two meshes with a refinement ratio, from their quantities
-    of interest (k, p). If both are the same mesh, it is 1, or inf, unknown, for one from a file.
+    of interest (k, p). If both are the same mesh, it is 1; inf, unknown, for a mesh from a file.
     """
     if ratio == 1:
         return np.inf if scene.body.file else 1.0

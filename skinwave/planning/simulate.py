@@ -85,9 +85,8 @@ def solve(scene: Scene, planned: Plan) -> Response:
 
 
 def compute(scene: Scene, model: str, **options: Any) -> Response:
-    """Solve a scene by one model, without a plan or warnings; see `SolveOptions` for `options`.
-
-    The expected error is unknown unless the model measures it. Raises the errors of `simulate`.
+    """Solve a scene by one model, without a plan or warnings; see `SolveOptions` for `options`. The
+    error is unknown unless the model measures it. Raises the errors of `simulate`.
     """
     return _solve_by_model(scene, SolveOptions(model=model, **options))
 

@@ -325,7 +325,7 @@ def rival_levels(run: NamedLines, velocity: bool = False) -> Floats:
 
 def multiple_levels(run: NamedLines) -> Floats:
     """Return the level of the strongest multiple of f_AM or f_d other than f_AM at each probe, in
-    dB re f_AM there. Sums and differences of both frequencies are not "these frequency harmonics".
+    dB re f_AM there. Sums and differences are not "these frequency harmonics".
     """
     names = [n for n in rivals(run) if not ("f_AM" in n and "f_d" in n)]
     return _probe_levels(run, names, "f_AM").max(axis=0, initial=-300.0)
@@ -345,9 +345,8 @@ def _strongest(run: NamedLines, names: list[str], reference: str = "f_AM") -> fl
 
 
 def _peak(run: NamedLines, line: str) -> float:
-    """Return the frequency in Hz of the spectral peak next to a line, at its strongest probe.
-
-    The logarithm is interpolated between bins; without a peak it is infinite.
+    """Return the frequency in Hz of the spectral peak next to a line at its strongest probe, from
+    the logarithm between bins; inf without a peak.
     """
     f, amplitude = run.spectrum
     x = amplitude[:, int(np.argmax(run.lines[line]))]

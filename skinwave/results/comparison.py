@@ -134,9 +134,8 @@ def compare(
 def phase_delays(
     reference: np.ndarray, candidate: np.ndarray, frequencies: Floats, probes: Floats
 ) -> Floats:
-    """Return the delays (f, p) in s as `Agreement.phase_delay` defines them.
-
-    Complex amplitudes are (f, p), at frequencies (f,) in Hz and probes (p, 2) in m.
+    """Return the delays (f, p) in s as `Agreement.phase_delay` defines them, from complex
+    amplitudes (f, p) at frequencies (f,) in Hz and probes (p, 2) in m.
     """
     delays = np.full(reference.shape, np.nan)
     for k, (a, b, f) in enumerate(zip(reference, candidate, frequencies, strict=True)):

@@ -31,7 +31,6 @@ def write_probes(stem: Path, response: Response) -> None:
 
 def write_sound(folder: Path, response: Response, probe: int) -> Path:
     """Write a probe's waveform about its mean as a WAV file (16 bit, mono) and return its path.
-
     Full scale is the largest value of the waveform, which the file name states.
     """
     from scipy.io import wavfile
@@ -89,7 +88,6 @@ def write_collection(
     *, overwrite: bool = False,
 ) -> None:  # fmt: skip
     """Write a ParaView collection, and beside it a file of each grid of pyvista, at times in s.
-
     Raises a ValueError if a file exists and `overwrite` is False.
     """
     names = [f"{folder_name(path.stem)}_{k:04d}.{suffix}" for k in range(len(times))]

@@ -95,9 +95,8 @@ def write_lines(path: Path, runs: Iterable[Run]) -> None:
 
 
 def line_rows(run: Run) -> Iterator[dict[str, Any]]:
-    """Yield rows of lines.csv by column.
-
-    The name of a peak that is not a line of the load is its kind, such as "free vibration".
+    """Yield rows of lines.csv by column. A peak that is not a line of the load has the name of its
+    kind, such as "free vibration".
     """
     quantity = run.response.record
     lines = [(name, f, run.table.amplitudes[name]) for name, f in run.line_hz.items()]

@@ -254,11 +254,8 @@ def tensors(moved: BodyMotion, times: Floats, frames: Ints) -> Tensors:
 def shade(scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints) -> Shade:
     """Return the probes' quantity at nodes (q,) of `moved.mesh` and times (t,) in s.
 
-    Raises
-    ------
-    ValueError
-        For a sheet, if the quantity is not normal motion; for strain or stress in a coat; and for
-        too many values.
+    Raises a ValueError for a quantity of a sheet other than normal motion, for strain or stress in
+    a coat, and for too many values.
     """
     quantity = scene.reading.record
     if scene.body.of_kind.is_plate and not quantity.is_normal:

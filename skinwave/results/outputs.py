@@ -118,9 +118,8 @@ def listed_files(folder: Path) -> dict[str, str] | None:
 
 
 def foreign_file(folder: Path) -> Path | None:
-    """Return the first file below a folder that was added or changed after skinwave wrote it.
-
-    A report within the folder has a list of its own.
+    """Return the first file below a folder that was added or changed after skinwave wrote it. A
+    report within the folder has a list of its own.
     """
     records, listed = set[Path](), dict[Path, str]()
     report = "report"  # folder that the command `report` makes within a result

@@ -175,7 +175,7 @@ def _nearest(scene: Scene, places: Floats) -> tuple[Floats, Floats]:
 
 
 def mach_angle(wave_speed: float, speed: float) -> float | None:
-    """Return the Mach angle asin(c/v) in rad of a focus on a straight path, or None if the focus is
+    """Return the Mach angle asin(c/v) in rad of a focus on a straight path; None if the focus is
     slower than the wave. On a circle smaller than a wavelength there is no clear cone.
     """
     return asin(wave_speed / speed) if speed > wave_speed else None

@@ -278,13 +278,7 @@ def save(path: Path, field: SurfaceField) -> None:
 
 
 def load(path: Path, scene: Scene) -> SurfaceField:
-    """Read a map of the probes' quantity from an npz file.
-
-    Raises
-    ------
-    ValueError
-        If the file holds something else.
-    """
+    """Read a map of the probes' quantity from an npz file; raises a ValueError if it is none."""
     try:
         arrays = reading.load_arrays(path)
         names = [name for name in ("x", "y", "rms", *OPTIONAL) if name in arrays]
@@ -311,7 +305,7 @@ def _field(
     on_body: np.ndarray | None = None,
 ) -> SurfaceField:  # fmt: skip
     """Return the map from lines (f,), (f, p c) of a scene at all places, or at those `on_body` (ny
-    nx,). Levels are of the lines while a pulse is on.
+    nx,), with levels of the lines while a pulse is on.
     """
     lines = lines_of(scene)
     quantity = scene.reading.record
