@@ -40,7 +40,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
-    from skinwave.planning.simulate import solve
+    from skinwave.planning.simulate import solve_as_planned
     from skinwave.results import record
     from skinwave.results.run import Run
     from skinwave.scene.file import read
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
         moved = begin_surface(scene, solving(options, progress, model=options.model), workers)
         begun = begin_pictures(scene, moved, workers) if moved else {}
         plan = plan_of_command(options, scene, progress=progress)
-        response = solve(scene, plan)
+        response = solve_as_planned(scene, plan)
         warn(w for w in response.effort.warnings if w not in plan.warnings)
         run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
         more: list[Part] = []

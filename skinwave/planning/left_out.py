@@ -19,16 +19,10 @@ from simple_model.layers.material import Material
 from simple_model.load.spectrum import load_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.bodies.sizes import coarsest_size, default_size
-from skinwave.models import Model, named
+from skinwave.models import Model, named, reduced
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import (
-    ReducedBody,
-    answer,
-    reduce_scene,
-    reduced_forces,
-    steady_waveforms,
-)
+from skinwave.models.reduced import ReducedBody
 from skinwave.models.relative_change import relative_changes
 from skinwave.scene.scene import SAMPLE_RATE as RATE
 from skinwave.scene.scene import Scene
@@ -71,8 +65,8 @@ def start_error(
         return 0.0
     times, first = grid
     if prepared:
-        whole = answer(prepared, scene, times=times).values
-        return _start(steady_waveforms(prepared, scene, times), lambda n: whole[:n], first)
+        whole = reduced.answer(prepared, scene, times=times).values
+        return _start(reduced.steady_waveforms(prepared, scene, times), lambda n: whole[:n], first)
     steady = model.solve(scene, times, COMPARISON.options).values
     transient = named(model.from_rest).solve
     return _start(steady, lambda n: transient(scene, times[:n], COMPARISON.options).values, first)
@@ -127,9 +121,9 @@ def sensitivity(
     """
     h = min(own.coarser * default_size(scene.body), coarsest_size(scene.body))
     without_sag = replace(scene, load=scene.load.moving)
-    coarse = prepared or reduce_scene(without_sag, SolveOptions(h=h))
+    coarse = prepared or reduced.reduce_scene(without_sag, SolveOptions(h=h))
     values = coarse.poles.values * (1 - own.detuning)
-    frequencies, forces = reduced_forces(coarse, *scene.loads)
+    frequencies, forces = reduced.reduced_forces(coarse, *scene.loads)
     duration = min(scene.tacton.duration, own.duration)
     times = np.arange(max(2, round(duration * RATE))) / RATE
 

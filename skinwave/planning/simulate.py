@@ -66,22 +66,25 @@ def simulate(
     """
     with progress_callback(progress) as report:
         request = SolveOptions(model=model, tolerance=tolerance, progress=report, **options)
-        response = solve(scene, plan(scene, request))
+        response = solve_as_planned(scene, plan(scene, request))
     for sentence in response.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
     return response
 
 
-def solve(scene: Scene, planned: Plan) -> Response:
+def solve_as_planned(scene: Scene, planned: Plan) -> Response:
     """Solve a scene as planned, and state the error; raises the errors of `simulate`."""
     options = replace(planned.options, model=planned.model, h=planned.h or planned.options.h)
     if planned.prepared and named(planned.model).is_reduced:
         times, first = sample_grid(scene, options.times)
         whole = answer(planned.prepared, scene, options.progress, times=times)
-        return _with_errors(scene, planned, from_first(whole, first))
-    with expecting(options.progress, planned.seconds):
-        response = _solve_by_model(replace(scene, body=planned.body), options)
-    return _with_errors(scene, planned, response)
+        response = from_first(whole, first)
+    else:
+        with expecting(options.progress, planned.seconds):
+            response = _solve_by_model(replace(scene, body=planned.body), options)
+    # A model that measures its errors replaces the planned ones.
+    statement = planned.statement.with_parts(response.effort.errors.parts)
+    return with_statement(scene, response, statement, planned.cautions)
 
 
 def compute(scene: Scene, model: str, **options: Any) -> Response:
@@ -99,12 +102,5 @@ def _solve_by_model(scene: Scene, options: SolveOptions) -> Response:
         check_laws(scene.body, scene.pressure)
     times, first = sample_grid(scene, options.times)
     response = from_first(model.solve(scene, times, options), first)
-    effort = response.effort
-    effort = effort if effort.versions else replace(effort, versions=versions())
+    effort = replace(response.effort, versions=response.effort.versions or versions())
     return replace(response, load=scene.pressure, effort=effort)
-
-
-def _with_errors(scene: Scene, planned: Plan, response: Response) -> Response:
-    """Return the response with planned errors, or those measured instead, and all warnings."""
-    statement = planned.statement.with_parts(response.effort.errors.parts)
-    return with_statement(scene, response, statement, planned.cautions)

@@ -29,7 +29,7 @@ from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.planning.plan import plan
 from skinwave.planning.record import Plan
-from skinwave.planning.simulate import compute, solve
+from skinwave.planning.simulate import compute, solve_as_planned
 from skinwave.report import description
 from skinwave.results import record, surface
 from skinwave.results.files import write_lines, write_run
@@ -182,7 +182,7 @@ def compute_views(
             continue
         own: Run | None = None
         with or_failed(failures, f"response of {column}"):
-            response = solve(each, plans[column])
+            response = solve_as_planned(each, plans[column])
             own = Run(tacton=scene.name, body=column, scene=each, response=response)
         if own is None:
             continue

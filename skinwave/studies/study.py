@@ -25,7 +25,7 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, reduce_scene
 from skinwave.planning.assessment import assess, coarser_body
 from skinwave.planning.plan import cheapest_model, plan
-from skinwave.planning.simulate import compute, solve
+from skinwave.planning.simulate import compute, solve_as_planned
 from skinwave.results.claims import AssessedClaim, assessable_runs, evaluate, write_claims
 from skinwave.results.files import write_lines, write_responses, write_run
 from skinwave.results.run import Run
@@ -294,7 +294,7 @@ def _runs(
                     prepared[column] = reduce_scene(scene, reporting)
                 else:
                     planned = plan(scene, replace(reporting, model=models[column]))
-                    response = solve(scene, planned)
+                    response = solve_as_planned(scene, planned)
                     if planned.prepared:
                         prepared[column] = planned.prepared
         if column in reduced and column not in prepared:
@@ -339,6 +339,6 @@ def _response(
     """Return a response and, of a body whose surface needs no mesh, its map and view."""
     if not scene.body.of_kind.discretise:
         return compute(scene, options.model), ({}, {})
-    response = solve(scene, plan(scene, options))
+    response = solve_as_planned(scene, plan(scene, options))
     run = Run(tacton=name, body=column, scene=scene, response=response)
     return response, quick_surface(run, part)

@@ -13,7 +13,7 @@ from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.planning.plan import plan
-from skinwave.planning.simulate import solve
+from skinwave.planning.simulate import solve_as_planned
 from skinwave.results.playback import played_part
 from skinwave.results.run import Run
 from skinwave.results.surface import element_map, grid, map_motions
@@ -119,5 +119,5 @@ def flat_run(name: str, scene: Scene, options: SolveOptions) -> Run | None:
     flat = with_body(scene, infinite(scene, scene.body))
     if not takes(FLAT_BODY, flat):
         return None
-    response = solve(flat, plan(flat, replace(options, model=FLAT_BODY.name)))
+    response = solve_as_planned(flat, plan(flat, replace(options, model=FLAT_BODY.name)))
     return Run(tacton=name, body="flat slab", scene=flat, response=response)

@@ -13,7 +13,7 @@ from simple_model.choices import choose
 from skinwave.models import named, names
 from skinwave.models.options import SolveOptions
 from skinwave.planning.plan import plan
-from skinwave.planning.simulate import compute, solve
+from skinwave.planning.simulate import compute, solve_as_planned
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.sweeps import dataset, engine
@@ -177,5 +177,5 @@ def _alone(scene: Scene, options: SolveOptions, assessed: bool) -> Response:
     """Return the response of a run without a shared reduction."""
     model = model_of(scene, options)
     if assessed or named(model).default_size is not None:
-        return solve(scene, plan(scene, replace(options, model=model)))
+        return solve_as_planned(scene, plan(scene, replace(options, model=model)))
     return compute(scene, model, tolerance=options.tolerance)

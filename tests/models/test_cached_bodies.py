@@ -19,7 +19,7 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, reduce_scene
 from skinwave.models.symmetry import axes_of_probes
 from skinwave.planning.plan import plan
-from skinwave.planning.simulate import compute, solve
+from skinwave.planning.simulate import compute, solve_as_planned
 from skinwave.scene.file import loads
 from skinwave.scene.scene import Scene
 
@@ -116,7 +116,7 @@ def test_a_plan_is_the_same_again_with_and_without_a_cache(monkeypatch, tmp_path
     scene, found = FREE, []
     for folder in ("one", "one", ""):
         monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / folder) if folder else "")
-        found.append(solve(scene, plan(scene, SolveOptions(tolerance=0.2))))
+        found.append(solve_as_planned(scene, plan(scene, SolveOptions(tolerance=0.2))))
     for other in found[1:]:
         assert cache.digest(other.values) == cache.digest(found[0].values)
         assert other.effort.mesh == found[0].effort.mesh

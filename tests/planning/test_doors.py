@@ -15,7 +15,7 @@ from skinwave.commands.cli import main
 from skinwave.models.options import SolveOptions
 from skinwave.planning.plan import plan
 from skinwave.planning.plan_warnings import implausible, large_deflection
-from skinwave.planning.simulate import compute, solve
+from skinwave.planning.simulate import compute, solve_as_planned
 from skinwave.scene.file import loads
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.templates import typeset
@@ -92,7 +92,9 @@ def test_every_error_above_the_tolerance_is_a_warning():
 @pytest.mark.parametrize("name", ["no waves", "sheet beyond linear bending"])
 def test_a_row_of_a_sweep_has_the_same_warnings(name, tmp_path, monkeypatch):
     text, arguments, part = WARNED[name]
-    sentences = solve(loads(text), plan(loads(text), SolveOptions(**arguments))).effort.warnings
+    sentences = solve_as_planned(
+        loads(text), plan(loads(text), SolveOptions(**arguments))
+    ).effort.warnings
     assert any(part in sentence for sentence in sentences)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(text)
@@ -110,7 +112,9 @@ def with_probe_twice(text):
 
 def test_pages_of_several_models_have_the_same_warnings(tmp_path, monkeypatch, capsys):
     scene = loads(with_probe_twice(LOUD_PAPER))
-    sentences = solve(scene, plan(scene, SolveOptions(model="fem", h=0.005))).effort.warnings
+    sentences = solve_as_planned(
+        scene, plan(scene, SolveOptions(model="fem", h=0.005))
+    ).effort.warnings
     assert len(sentences) >= 3
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(with_probe_twice(LOUD_PAPER))
@@ -125,7 +129,9 @@ def test_pages_of_several_models_have_the_same_warnings(tmp_path, monkeypatch, c
 def test_a_field_has_the_same_warnings():
     times = np.arange(4) * 2.5e-3
     scene = loads(with_probe_twice(SLAB))
-    sentences = solve(scene, plan(scene, SolveOptions(model="fem", h=0.008))).effort.warnings
+    sentences = solve_as_planned(
+        scene, plan(scene, SolveOptions(model="fem", h=0.008))
+    ).effort.warnings
     with pytest.warns(skinwave.SkinwaveWarning) as caught:
         field = skinwave.field(scene, times, 0.05, h=0.008)
     assert [str(w.message) for w in caught] == list(field.effort.warnings) == list(sentences)

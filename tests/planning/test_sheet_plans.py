@@ -17,7 +17,7 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST, sheet_motion
 from skinwave.planning.plan import cheapest_model, why_modes
 from skinwave.planning.plan_warnings import large_deflection
-from skinwave.planning.simulate import compute, solve
+from skinwave.planning.simulate import compute, solve_as_planned
 from skinwave.results.comparison import compare
 from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES, Body, Scene
@@ -63,7 +63,7 @@ def test_sheets_in_frames_and_between_edges_are_planned_and_run(size, edges):
     required = plan(scene)
     assert (required.model, required.h) == (FROM_REST.name, None)
     assert "need no mesh" in required.rows[1].reason
-    found = solve(scene, required)
+    found = solve_as_planned(scene, required)
     assert found.model == FROM_REST.name
     assert 0 < found.expected_error <= 0.05
     assert np.abs(found.values[0]).max() < 0.01 * np.abs(found.values).max()
@@ -92,7 +92,7 @@ def test_the_error_of_linear_bending_is_stated(pressure):
     load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1), peak_pressure=pressure)
     scene = Scene(pressure=load, body=BODIES["paper-sheet-loose"], probes=((0.01, 0.005),))
     required = plan(scene, SolveOptions(model=FROM_REST.name))
-    linear = solve(scene, required)
+    linear = solve_as_planned(scene, required)
     true = compare(compute(scene, "plate-modes-nonlinear"), linear).relative_l2.max()
     assert true < 1.1 * linear.expected_error
     assert linear.expected_error < 2 * true + 0.02

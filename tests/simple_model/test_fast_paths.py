@@ -23,7 +23,7 @@ from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY
 from skinwave import Body, Scene
 from skinwave.models.options import SolveOptions
 from skinwave.planning.plan import plan
-from skinwave.planning.simulate import compute, solve
+from skinwave.planning.simulate import compute, solve_as_planned
 
 PALM = slab(PRESETS["palm"], 0.015)
 PROBES = np.array([[0.01, 0.0], [0.02, 0.0]])
@@ -35,7 +35,7 @@ ONE_WAY = Trajectory(shape="line", size=0.02, speed=0.05, sweep="one_way")  # 0.
 
 
 def solved(scene, **options):
-    return solve(scene, plan(scene, SolveOptions(**options)))
+    return solve_as_planned(scene, plan(scene, SolveOptions(**options)))
 
 
 def misfit(found, expected, alternating, late):
