@@ -6,7 +6,6 @@ names only models that take the scene, and changes after which a model does.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 from simple_model import MovingPressure
@@ -46,7 +45,7 @@ def beyond(model: Model, scene: Scene) -> list[Limit]:
     """Return the limits of a model that a scene exceeds."""
     if model.needs_body and not scene.body.of_kind.discretise:
         return [Limit(why="needs a body that moves, and the scene has none")]
-    return [*(model.limits or partial(surface_limits, rates=False))(scene)]
+    return [*(model.limits or plain_limits)(scene)]
 
 
 def takes(model: Model, scene: Scene) -> bool:
@@ -190,10 +189,19 @@ def _without_load(scene: Scene) -> Scene:
     return replace(scene, load=PRESSURE, pressure=pressure)
 
 
-def surface_limits(scene: Scene, *, rates: bool = True) -> Iterator[Limit]:
-    """Yield the limits of models of the surface displacement, and its rates, under a focus."""
-    reading = scene.reading
-    if not (reading.record.is_normal and reading.is_on_surface if rates else reading.is_plain):
+def plain_limits(scene: Scene) -> Iterator[Limit]:
+    """Yield the limits of models that compute only the surface displacement under a focus."""
+    yield from _reading_and_load_limits(scene, scene.reading.is_plain)
+
+
+def surface_limits(scene: Scene) -> Iterator[Limit]:
+    """Yield the limits of models of the surface displacement and its rates under a focus."""
+    of_surface = scene.reading.record.is_normal and scene.reading.is_on_surface
+    yield from _reading_and_load_limits(scene, of_surface)
+
+
+def _reading_and_load_limits(scene: Scene, computes_reading: bool) -> Iterator[Limit]:
+    if not computes_reading:
         yield reading_limit(scene)
     if not scene.load.is_plain:
         yield load_limit(scene)
