@@ -6,8 +6,10 @@ eadf2037 (2023), doi 10.1126/sciadv.adf2037, record 10.5281/zenodo.7686560. Its 
 velocity along the laser in m/s at N places, M times, 2 repetitions, each with a reference r.
 """
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,28 +17,20 @@ import numpy as np
 from meshes import reading, subprocess_call
 from meshes.tetmesh import MeshError
 from simple_model.quantities import QUANTITIES
-from skinwave.measure import units, universal
+from skinwave.measure import universal
 from skinwave.measure.delays import align_by_references
-from skinwave.measure.headers import NAMES, TIME, parse_heading
 from skinwave.measure.matlab import DAMAGED, read_arrays
 from skinwave.measure.recording import Given, Recording, factors_in, unknown_places
-from skinwave.measure.table import rises
+from skinwave.measure.table import NOTES, rate_in, rises
 from skinwave.models import named, names
+from skinwave.system import units
 from skinwave.system.formats import MEASUREMENTS, register
+from skinwave.system.headings import AXES, MOTION_NAMES, parse_heading
 from skinwave.typing import Floats
 
 FORMAT = "skinwave measurement 1"
-LARGEST = 2_000_000_000  # bytes of a MATLAB file
-TIMES = ("t", "time", "times", "t_s", "time_s")
-FREQUENCIES = ("f", "freq", "frequency", "frequencies", "frequency_hz", "f_hz")
-RATES = (
-    "fs", "rate", "sampling_rate", "sample_rate", "samplerate", "sampling_frequency", "rate_hz",
-)  # fmt: skip
-STARTS = ("t0", "t_start", "tstart", "start_time", "x0")
-INTERVALS = ("dt", "sampling_interval")
 PLACES = ("places", "points", "probes", "xy", "xyz", "positions", "coordinates", "locations")
-MILLIMETRES = tuple(f"{name}_mm" for name in PLACES)
-DRIVES = ("drive", "ref", "reference", "r", "trigger")
+DRIVES = (*AXES["drive"], "r")
 Arrays = Mapping[str, np.ndarray]
 
 
@@ -90,9 +84,9 @@ def sdynpy_functions(arrays: Arrays) -> list[universal.Function]:
     return functions
 
 
-def read_mat(path: Path, given: Given) -> Recording:
-    """Return the recording in a MATLAB file."""
-    with reading.open_regular(path, LARGEST) as file:
+def read_mat(path: Path, given: Given, largest: int = 2_000_000_000) -> Recording:
+    """Return the recording in a MATLAB file of at most `largest` bytes."""
+    with reading.open_regular(path, largest) as file:
         if not file.read(1):
             raise ValueError("the file is empty; download or export it again")
     try:
@@ -136,7 +130,7 @@ def recording_of(arrays: Arrays, given: Given) -> Recording:
     if name not in arrays:
         raise ValueError(f"no array is named '{name[:40]}'; give --variable as {_list(arrays)}")
     short = _beside(arrays, name)
-    times, frequencies = _times(short), _vector(short, FREQUENCIES)
+    times, frequencies = _axis(short, "time"), _axis(short, "frequency")
     values = np.asarray(arrays[name])
     if values.dtype.kind not in "fiuc" or not values.size:
         raise ValueError(f"the array '{name[:40]}' has no numbers; give another --variable")
@@ -159,14 +153,12 @@ def recording_of(arrays: Arrays, given: Given) -> Recording:
             return np.transpose(array, (2, 1, 0))
         return _in_order(array, count, len(places), name, remarks)
 
-    moved, start = ordered(values), _scalar(short, STARTS)
-    rate, interval = _scalar(short, RATES), _scalar(short, INTERVALS)
-    rate = rate if rate > 0 else 1 / interval if interval > 0 else np.nan
+    moved, start, rate = ordered(values), _number(short, "start"), rate_in(partial(_number, short))
     if not (count or np.isnan(start + rate)):
         times = start + np.arange(moved.shape[1]) / rate
     elif not (count or is_zigzag):
         times, moved = _times_within(moved, name, given, remarks)
-    drive = _vector(short, DRIVES)
+    drive = next((one for key in DRIVES if len(one := _vector(short, key))), np.empty(0))
     if not len(frequencies):
         moved = _real(moved, name)
         if references.shape == values.shape:
@@ -179,8 +171,7 @@ def recording_of(arrays: Arrays, given: Given) -> Recording:
     quantity = heading.role if heading.role in units.MOTION else ""
     if not word["unit"] and units.quantity_of(heading.unit) in ("", quantity):
         word["unit"] = heading.unit
-    else:
-        word["unit"] += f" {units.split_level(heading.unit)[1]}".rstrip()
+    word["unit"] = f"{word['unit']} {heading.level}".strip()
     if len(frequencies) and not np.iscomplexobj(values):
         raise ValueError(f"the spectrum '{name[:40]}' has no phase; save complex amplitudes")
     numbers = {key: x for key, x in short.items() if x.size and x.dtype.kind in "fiu"}
@@ -250,15 +241,13 @@ def _in_order(
 
 def _motion(arrays: Arrays) -> str:
     """Return the name of the array of motion."""
-    not_motion = (*TIMES, *FREQUENCIES, *RATES, *INTERVALS, *STARTS, *PLACES, *MILLIMETRES, *DRIVES,
-                  "quantity", "unit", "name")  # fmt: skip
-    candidates = [
-        name for name, array in arrays.items()
-        if array.dtype.kind in "fiuc" and array.size > 1 and _last(name) not in not_motion
-    ]  # fmt: skip
-    motion = {
-        name: quantity for quantity in units.MOTION for name in NAMES[quantity]
-    } | dict.fromkeys(("values", "y", "data", "signal", "signals"), "")
+    others = {*AXES["time"], *AXES["frequency"], *DRIVES, *PLACES, "quantity", "unit", "name"}
+    numbers = [name for name, array in arrays.items()
+               if array.dtype.kind in "fiuc" and array.size > 1]  # fmt: skip
+    candidates = [name for name in numbers if _stem(name) not in others
+                  and not any(key.fullmatch(_last(name)) for key in NOTES.values())]  # fmt: skip
+    motion = {name for names in MOTION_NAMES.values() for name in names}
+    motion |= {"values", "y", "data", "signal", "signals"}
     candidates = [name for name in candidates if _last(name) in motion] or candidates
     if not candidates:
         raise ValueError(f"no array is motion, only {_list(arrays)}; give --variable")
@@ -272,31 +261,35 @@ def _list(names: Iterable[str]) -> str:
     return ", ".join(shown[:12]) + (f" and {len(shown) - 12} more" if len(shown) > 12 else "")
 
 
-def _vector(arrays: Arrays, names: tuple[str, ...]) -> np.ndarray:
-    """Return the first vector with one of these names; empty if there is none."""
-    for name in names:
-        array = arrays.get(name, np.empty(0))
-        if array.dtype.kind not in "fiuc" or array.size < 2:
+def _stem(name: str) -> str:
+    """Return the last name without a unit of time, frequency or length."""
+    return re.sub("_(s|ms|us|ns|hz|khz|mm)$", "", _last(name))
+
+
+def _axis(arrays: Arrays, role: str) -> np.ndarray:
+    """Return times in s, or frequencies in Hz, by a name such as "t" or "t_ms"; else an empty one.
+
+    Times may have an axis of places, along which they must be equal.
+    """
+    for name in sorted(arrays, key=len):
+        array, unit = arrays[name], parse_heading(name).unit
+        if _stem(name) not in AXES[role] or array.dtype.kind not in "fiuc":
             continue
-        if array.size == max(array.shape):
-            return array.ravel()
-        if names is TIMES and array.ndim == 2:  # times of each place
+        if role == "time" and array.ndim == 2 and 1 not in array.shape:
             rows = array if np.diff(array, axis=1).min(initial=1.0) > 0 else array.T
-            first = rows[np.argmax(np.isfinite(rows).sum(axis=1))]
-            if not (np.isnan(rows) | np.isclose(rows, first, rtol=1e-9, atol=0)).all():
+            array = rows[np.argmax(np.isfinite(rows).sum(axis=1))]
+            if not (np.isnan(rows) | np.isclose(rows, array, rtol=1e-9, atol=0)).all():
                 raise ValueError(f"times '{name}' differ from place to place; save common times")
-            return first
+        if len(vector := _vector({name: array}, name)):
+            return units.in_si(vector.real, units.divisor(unit, role) if unit else 1.0)
     return np.empty(0)
 
 
-def _times(arrays: Arrays) -> np.ndarray:
-    """Return times in s from "t" or "time", or from a name with its unit: "t_ms"."""
-    times = _vector(arrays, TIMES).real
-    for name in () if len(times) else arrays:
-        column = parse_heading(name)
-        if column.role == TIME and column.unit and len(array := _vector(arrays, (name,))):
-            times = units.in_si(array, units.divisor(column.unit, units.TIMES, "time"))
-    return times
+def _vector(arrays: Arrays, name: str) -> np.ndarray:
+    """Return the numbers of a vector; empty if there is no such vector."""
+    array = arrays.get(name, np.empty(0))
+    is_vector = array.dtype.kind in "fiuc" and array.size == max(array.shape, default=0) > 1
+    return array.ravel() if is_vector else np.empty(0)
 
 
 def _times_within(
@@ -314,24 +307,25 @@ def _times_within(
     return values[0, :, rising[0]].astype(float), np.delete(values, rising[0], axis=2)
 
 
-def _scalar(arrays: Arrays, names: tuple[str, ...]) -> float:
-    """Return the first single number with one of these names, or nan."""
-    for name in names:
-        array = arrays.get(name, np.empty(0))
-        if array.dtype.kind in "fiu" and array.size == 1:
+def _number(arrays: Arrays, note: str) -> float:
+    """Return the first single number whose name is that of one of the `NOTES`, or nan."""
+    for name, array in arrays.items():
+        if NOTES[note].fullmatch(name) and array.dtype.kind in "fiu" and array.size == 1:
             return float(array.ravel()[0])
     return float("nan")
 
 
-def _places(arrays: Arrays) -> Floats:
-    """Return places (p, 2) in m from the first two coordinates; (0, 2) if there are none."""
-    farthest = 5.0  # m, of a place; beyond it the unit is not the metre
-    for name in (*PLACES, *MILLIMETRES):
+def _places(arrays: Arrays, farthest: float = 5.0) -> Floats:
+    """Return places (p, 2) in m from the first two coordinates; (0, 2) if there are none.
+
+    Beyond a distance `farthest` in m, the unit is not the metre.
+    """
+    for name in (*PLACES, *(f"{name}_mm" for name in PLACES)):
         array = arrays.get(name, np.empty(0))
         if array.dtype.kind not in "fiu" or array.ndim != 2 or not {2, 3} & set(array.shape):
             continue
         points = (array if array.shape[1] in (2, 3) else array.T)[:, :2].astype(np.float64)
-        points = points / 1e3 if name in MILLIMETRES else points
+        points = points / 1e3 if name.endswith("_mm") else points
         if (largest := np.nanmax(np.abs(points), initial=0.0)) > farthest:
             raise ValueError(
                 f"'{name}' reaches {largest:g} m; name it 'places_mm', or give --places"

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
-from skinwave.measure.headers import Column, parse_heading
 from skinwave.measure.recording import Given, Recording, factors_in
-from skinwave.measure.table import Table, choose_columns, recording_of
+from skinwave.measure.table import choose_columns, recording_of
 from skinwave.system.formats import MEASUREMENTS, register
+from skinwave.system.headings import Column, parse_heading
+from skinwave.system.text_table import Table
 
 
 def read_lvm(text: str, given: Given) -> Recording:

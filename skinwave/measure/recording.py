@@ -9,8 +9,8 @@ import numpy as np
 
 from simple_model.choices import choose
 from simple_model.quantities import QUANTITIES
-from skinwave.measure import units
 from skinwave.measure.measurement import UNEVEN, Measurement
+from skinwave.system import units
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
@@ -116,12 +116,13 @@ def _amplitude(recording: Recording, given: Given, remarks: list[str]) -> float:
     """Return the amplitude of values whose level, such as RMS, is 1."""
     units.check_linear(recording.unit)
     level = units.split_level(given.unit)[1] or units.split_level(recording.unit)[1]
+    factor = units.amplitude(level)
     if recording.frequencies.size:
-        if (factor := units.AMPLITUDES[level]) != 1:
+        if factor != 1:
             remarks.append(f"{level} values are multiplied by {factor:.4g}, which gives amplitudes")
         return factor
     is_level = np.isrealobj(recording.values) and np.nanmin(recording.values, initial=0.0) >= 0
-    if level in (units.RMS, units.PEAK_TO_PEAK) or (level and is_level and not given.unit):
+    if factor != 1 or (level and is_level and not given.unit):
         cure = 'export the waveform or, if it is one, give a unit such as --unit "mm/s peak"'
         raise ValueError(f"{level} values over time are a level, not a waveform; {cure}")
     return 1.0

@@ -5,81 +5,69 @@ from the numbers, with a remark.
 """
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from skinwave.measure import units
-from skinwave.measure.headers import DRIVE, FREQUENCY, INDEX, REPETITION, TIME, Column, X, Y, Z
 from skinwave.measure.recording import Given, Recording, factors_in
-from skinwave.measure.units import FREQUENCIES, LENGTHS, TIMES, canonical, quantity_of
+from skinwave.system import units
+from skinwave.system.headings import Column
+from skinwave.system.text_table import Table
+from skinwave.system.units import canonical, dimension_of, is_of_reference, quantity_of
 from skinwave.typing import Floats
 
 EXAMPLE = "t [s], v(0,0) [mm/s], v(5,0) [mm/s]"
 LONG_EXAMPLE = "t [s], x [mm], y [mm], v [mm/s]"
-# Keys of notes, in lower case.
-_RATE = re.compile(r"sampl\w*[ _-]*(rate|freq\w*)|abtast(rate|frequenz)|fs|rate")
-_INTERVAL = re.compile(
-    r"(sampl\w*|time)[ _-]*(interval|increment|period)|increment|delta_x|dt|tinc"
-)
-_START = re.compile(r"start|x0|t0|trigger offset|first time")
-_BAND = re.compile(r"(band[ _-]*|cent(er|re)[ _-]*)?(frequency|frequenz|fréquence)")
-_AXIS_UNIT = re.compile(r"(horizontal|x|time)[ _-]*units?")
-_UNIT = re.compile(r"(vertical|y)?[ _-]*(units?|einheit)")
-_DIRECTION = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
-_FORCE = re.compile(r"force|kraft|hammer|shaker|excit|anreg", re.IGNORECASE)
-_SIGNED = re.compile(r"([-+])([xyz])(?![a-z])|(?<![a-z])([xyz])([-+])(?!\w)", re.IGNORECASE)
-# Notes that tell what amplitudes are; averages of a spectrum do not.
-_SCALING = re.compile(
-    r"(?!.*(averag|mittel)).*(scal|skal|signal|amplitud|magnitud|spe[ck]t|type|detect)"
-)
-Notes = list[tuple[str, str]]
+NOTES = {  # keys of notes, or names of numbers, in lower case
+    name: re.compile(key)
+    for name, key in {
+        "rate": r"sampl\w*[ _-]*(rate|freq\w*)|abtast(rate|frequenz)|fs|rate(_hz)?",
+        "interval":
+            r"(sampl\w*|time)[ _-]*(interval|increment|period)|increment|delta_x|dt|tinc",
+        "start": r"start(_time)?|t_?start|x0|t0|trigger offset|first time",
+        "band": r"(band[ _-]*|cent(er|re)[ _-]*)?(frequency|frequenz|fréquence)",
+        "axis unit": r"(horizontal|x|time)[ _-]*units?",
+        "unit": r"(vertical|y)?[ _-]*(units?|einheit)",
+    }.items()
+}  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Table:
-    """Columns, their numbers (n, c), and the notes above them."""
+def rate_in(number: Callable[[str], float]) -> float:
+    """Return the sampling rate in Hz from the numbers of `NOTES`, or nan."""
+    rate, interval = number("rate"), number("interval")
+    return rate if rate > 0 else 1 / interval if interval > 0 else float("nan")
 
-    columns: tuple[Column, ...]
-    numbers: Floats
-    notes: tuple[tuple[str, str], ...] = ()
 
-    def index(self, role: str) -> int:
-        """Return the index of the only column with a role, or -1."""
-        at = [k for k, column in enumerate(self.columns) if column.role == role]
-        if len(at) > 1:
-            raise ValueError(f"{len(at)} columns hold the {role}; export one of them")
-        return at[0] if at else -1
-
-    def note(self, key: re.Pattern[str]) -> str:
-        """Return the first value of a note, or ""."""
-        return next((value for name, value in self.notes if key.fullmatch(name) and value), "")
-
-    def number(self, key: re.Pattern[str], known: dict[str, float]) -> float:
-        """Return the number of a note in SI, or nan."""
-        match = re.fullmatch(r"\D*?([-+.\deE,]+)\s*([^\d\s].*)?", self.note(key))
-        if not match:
-            return float("nan")
-        unit = re.sub(r"^(k?)Sa?/s$", r"\1Hz", canonical(match[2] or ""))
-        if not unit and known is TIMES:
-            unit = canonical(self.note(_AXIS_UNIT))
-        try:
-            return float(match[1].replace(",", ".")) / known[unit or next(iter(known))]
-        except (KeyError, ValueError):
-            return float("nan")
+def _number(table: Table, name: str) -> float:
+    """Return the number of a note of time or frequency in SI, or nan."""
+    match = re.fullmatch(r"\D*?([-+.\deE,]+)\s*([^\d\s].*)?", table.note(NOTES[name]))
+    if not match:
+        return float("nan")
+    dimension = "frequency" if name in ("rate", "band") else "time"
+    unit = re.sub(r"^(k?)Sa?/s$", r"\1Hz", canonical(match[2] or ""))
+    if not unit and dimension == "time":
+        unit = table.note(NOTES["axis unit"])
+    try:
+        number = float(match[1].replace(",", "."))
+        return number / units.divisor(unit, dimension) if unit else number
+    except ValueError:
+        return float("nan")
 
 
 def recording_of(table: Table, given: Given) -> Recording:
     """Return the recording in a table. Raises a ValueError if its columns are not a measurement."""
+    if np.iscomplexobj(table.numbers):
+        raise ValueError("the table has complex numbers; export real and imaginary parts")
     table, remarks = _with_roles(table, given)
     columns, numbers = table.columns, table.numbers
     motion = [k for k, column in enumerate(columns) if column.may_be_motion]
-    at_time, at_frequency = table.index(TIME), table.index(FREQUENCY)
-    is_long = max(table.index(X), table.index(Y)) >= 0
+    at_time, at_frequency = table.index("time"), table.index("frequency")
+    is_long = max(table.index("x"), table.index("y")) >= 0
     if min(at_time, at_frequency) >= 0 and not is_long:
         raise ValueError("the table has times and frequencies; export one of them")
-    if is_long and (min(table.index(X), table.index(Y)) < 0 or not motion):
+    if is_long and (min(table.index("x"), table.index("y")) < 0 or not motion):
         raise ValueError(f"a table with a row per place needs the columns {LONG_EXAMPLE}")
     times, frequencies = _axis(table, max(at_time, at_frequency), given, is_long)
     if not motion:
@@ -93,7 +81,7 @@ def recording_of(table: Table, given: Given) -> Recording:
         axis, row = np.unique(times if len(times) else frequencies, return_inverse=True)
         times, frequencies = (axis, frequencies) if len(times) else (times, axis)
         places, spot = _distinct(coordinates(table))
-        at = table.index(REPETITION)
+        at = table.index("repetition")
         run = np.unique(numbers[:, at], return_inverse=True)[1] if at >= 0 else 0 * row
         values = _arrange(series[0][1], (run, row, spot))
         drive = _arrange(drive, (run, row, spot))[0, :, 0] if len(drive) else drive
@@ -116,10 +104,14 @@ def _sign(columns: list[Column], given: Given) -> int:
     A force and a motion into the body are alike, so that it is the product of both signs. Returns 0
     if no heading names both.
     """
+    force = re.compile("force|kraft|hammer|shaker|excit|anreg", re.IGNORECASE)
+    signed = re.compile(
+        r"([-+])([xyz])(?![a-z])|(?<![a-z])([xyz])([-+])(?!\w)", re.IGNORECASE
+    )  # fmt: skip
     signs = set()
     for column in columns:
-        found = [(a + d, (b + c).lower()) for a, b, c, d in _SIGNED.findall(column.text)]
-        if len(found) == 1 and _FORCE.search(column.text):
+        found = [(a + d, (b + c).lower()) for a, b, c, d in signed.findall(column.text)]
+        if len(found) == 1 and force.search(column.text):
             found *= 1 if given.sign else 3  # the direction of the other is unknown
         if len(found) > 1:
             (sign, axis), (other, along) = found[:2]
@@ -133,34 +125,39 @@ def _sign(columns: list[Column], given: Given) -> int:
 def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
     """Return the table of relevant columns, with roles inferred from their numbers, and remarks."""
     numbers, remarks = _rows(table), []
+    ratios = [units.per_reference(column.unit) for column in table.columns]
     columns = [
-        replace(column, unit=units.per_reference(column.unit)[0]) for column in table.columns
+        replace(column, unit=unit, level="") if is_ratio else column  # both have the level
+        for column, (unit, is_ratio) in zip(table.columns, ratios, strict=True)
     ]
-    if any(units.per_reference(column.unit)[1] for column in table.columns):
+    if any(is_ratio for _, is_ratio in ratios):
         remarks.append("values are per unit of the reference")
     roles = {column.role for column in columns}
-    for key, value in table.notes if FREQUENCY in roles else ():
+    scaling = re.compile(  # what amplitudes are; averages of a spectrum do not tell
+        r"(?!.*(averag|mittel)).*(scal|skal|signal|amplitud|magnitud|spe[ck]t|type|detect)"
+    )
+    for key, value in table.notes if "frequency" in roles else ():
         level = units.split_level(f"{key} {value}")[1]
-        if not level or any(units.split_level(column.unit)[1] for column in columns):
+        if not level or any(column.level for column in columns):
             continue
-        if not value or _SCALING.match(key):
+        if not value or scaling.match(key):
             columns = [column.with_level(level) for column in columns]
         else:
             remarks.append(
                 f"the file says '{key[:40]}: {value[:40]}'; values are taken as amplitudes, unless "
                 f'a unit such as --unit "mm/s {level}" is given'
             )
-    has_axis = bool(roles & {TIME, FREQUENCY})
-    has_lengths = any(canonical(column.unit) in LENGTHS for column in columns)
-    has_places = {X, Y} <= roles and (has_axis or has_lengths)
+    has_axis = bool(roles & {"time", "frequency"})
+    has_lengths = any(dimension_of(column.unit) == "length" for column in columns)
+    has_places = {"x", "y"} <= roles and (has_axis or has_lengths)
     for k, column in enumerate(columns) if not has_places else ():
-        is_length = canonical(column.unit) in LENGTHS
-        is_other = column.role in (X, Y, Z) and not is_length
-        if is_other or (column.role == INDEX and not _counts(numbers[:, k])):
+        is_other = column.role in ("x", "y", "z") and dimension_of(column.unit) != "length"
+        if is_other or (column.role == "index" and not _counts(numbers[:, k])):
             columns[k] = replace(column, role="")
     chosen = choose_columns(columns, given.columns)
-    directions = [_DIRECTION.search(c.text.lower()) for c in columns if quantity_of(c.unit)]
-    axes = sorted({match[1] for match in directions if match})
+    axis = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
+    found = [axis.search(column.text.lower()) for column in columns if quantity_of(column.unit)]
+    axes = sorted({match[1] for match in found if match})
     if len(axes) > 1 and not (chosen or has_places):
         raise ValueError(f"columns are along {', '.join(axes)}; choose one with --columns")
     for k, column in enumerate(columns) if len(columns) > 1 else ():
@@ -168,16 +165,16 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
             continue
         counts = _counts(numbers[:, k]) and numbers[0, k] in (0, 1)
         if counts or not has_axis:
-            columns[k] = replace(column, role=INDEX if counts else TIME)
+            columns[k] = replace(column, role="index" if counts else "time")
         kind = "a count of samples" if counts else "motion" if has_axis else "time"
         remarks.append(f"column {k + 1} rises evenly and is taken as {kind}")
     columns = _one_time(columns, numbers, chosen)
     kept = [k for k, column in enumerate(columns) if k in chosen or not column.may_be_motion]
     if not chosen:
         kept = _motion(columns, given, remarks)
-    axis_unit, unit = table.note(_AXIS_UNIT), table.note(_UNIT)
+    axis_unit, unit = table.note(NOTES["axis unit"]), table.note(NOTES["unit"])
     for k, column in enumerate(columns):
-        if not column.unit and column.role == TIME:
+        if not column.unit and column.role == "time":
             columns[k] = replace(column, unit=axis_unit)
         elif not column.unit and column.may_be_motion and quantity_of(unit):
             columns[k] = replace(column, unit=unit)
@@ -187,7 +184,7 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
         name = f"row {row + 1} of column '{columns[k].text or k + 1}'"
         raise ValueError(f"{name} is an overload; measure with a larger range")
     if has_axis and chosen:  # tests beside each other may differ in length
-        own = [column.role != INDEX for column in columns]
+        own = [column.role != "index" for column in columns]
         numbers = numbers[~np.isnan(numbers[:, own]).all(axis=1)]
     return replace(table, columns=tuple(columns), numbers=numbers), remarks
 
@@ -195,7 +192,7 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
 def _rows(table: Table) -> Floats:
     """Return the numbers without empty rows, if times show which rows are missing."""
     full = ~np.isnan(table.numbers).all(axis=1)
-    has_axis = any(column.role in (TIME, FREQUENCY) for column in table.columns)
+    has_axis = any(column.role in ("time", "frequency") for column in table.columns)
     has_axis = has_axis or any(map(rises, table.numbers[full].T))
     return table.numbers[full] if has_axis else table.numbers
 
@@ -221,7 +218,7 @@ def _one_time(columns: list[Column], numbers: Floats, chosen: list[int]) -> list
     """Return columns with a single one of times: that to the left of the chosen motion, if any.
     Constants, such as dates, are dropped.
     """
-    times = [k for k, column in enumerate(columns) if column.role in (TIME, FREQUENCY)]
+    times = [k for k, column in enumerate(columns) if column.role in ("time", "frequency")]
     if len(times) < 2:
         return columns
     varying = [k for k in times if len(numbers) == 1 or np.ptp(numbers[:, k])] or times[:1]
@@ -237,7 +234,7 @@ def _one_time(columns: list[Column], numbers: Floats, chosen: list[int]) -> list
             names = f"'{columns[first].text}' and '{columns[k].text}'"
             raise ValueError(f"the columns {names} differ; choose motion with --columns")
     return [
-        replace(column, role=INDEX) if k in times and k != first else column
+        replace(column, role="index") if k in times and k != first else column
         for k, column in enumerate(columns)
     ]
 
@@ -265,7 +262,7 @@ def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int
     bare = [k for k in motion if k not in known and np.isnan(columns[k].place[0])]
     names = ", ".join(columns[k].text or str(k + 1) for k in bare)
     if len(bare) == len(motion) > 1 and given.places is None:
-        if all(canonical(columns[k].unit) in units.REFERENCES for k in bare):
+        if all(is_of_reference(columns[k].unit) for k in bare):
             unit = columns[bare[0]].unit
             raise ValueError(f"columns {names} are in {unit}; give --columns or --places")
         remarks.append(f"columns {names} are taken as places; if one is the drive, give --columns")
@@ -273,10 +270,10 @@ def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int
         return list(range(len(columns)))
     left_out = [k for k in motion if k not in known and columns[k].unit
                 and columns[k].part != "phase"]  # fmt: skip
-    drives = [k for k in left_out if canonical(columns[k].unit) in units.REFERENCES]
-    if len(drives) == 1 and not any(column.role == DRIVE for column in columns):
+    drives = [k for k in left_out if is_of_reference(columns[k].unit)]
+    if len(drives) == 1 and not any(column.role == "drive" for column in columns):
         k = drives[0]
-        columns[k] = replace(columns[k], role=DRIVE)
+        columns[k] = replace(columns[k], role="drive")
         left_out.remove(k)
         remarks.append(f"column '{columns[k].text}' in {columns[k].unit} is taken as the drive")
     if left_out:
@@ -291,28 +288,27 @@ def _axis(table: Table, at: int, given: Given, is_long: bool) -> tuple[Floats, F
     """Return times in s and frequencies in Hz of the rows; one of them, or both, is empty."""
     empty, count = np.empty(0), len(table.numbers)
     if at < 0 and is_long:
-        band = table.number(_BAND, FREQUENCIES)
+        band = _number(table, "band")
         if np.isnan(band):
             raise ValueError(f"a table with a row per place needs the columns {LONG_EXAMPLE}")
         return empty, np.full(count, band)
     if at < 0:
-        rate, interval = table.number(_RATE, FREQUENCIES), table.number(_INTERVAL, TIMES)
-        rate = rate if rate > 0 else 1 / interval if interval > 0 else np.nan
+        rate = rate_in(partial(_number, table))
         if np.isnan(rate):
             if given.rate is None:
                 raise ValueError(f"no column has times; write {EXAMPLE} above, or give --rate")
             return empty, empty
-        return np.nan_to_num(table.number(_START, TIMES)) + np.arange(count) / rate, empty
+        return np.nan_to_num(_number(table, "start")) + np.arange(count) / rate, empty
     column, values = table.columns[at], table.numbers[:, at]
-    is_time = column.role == TIME
-    if is_time and given.rate is not None and not is_long and canonical(column.unit) not in TIMES:
+    is_time = column.role == "time"
+    is_in_units = dimension_of(column.unit) == "time"
+    if is_time and given.rate is not None and not (is_long or is_in_units):
         return values, empty  # the rate replaces the unit
     if not column.unit:
         cure = "write 't [s]', or give --rate" if is_time else "write 'f [Hz]'"
         raise ValueError(f"the column '{column.text or at + 1}' has no unit; {cure}")
-    if is_time:
-        return units.in_si(values, units.divisor(column.unit, TIMES, "time")), empty
-    return empty, units.in_si(values, units.divisor(column.unit, FREQUENCIES, "frequency"))
+    values = units.in_si(values, units.divisor(column.unit, column.role))
+    return (values, empty) if is_time else (empty, values)
 
 
 Series = list[tuple[Column, np.ndarray]]
@@ -343,20 +339,21 @@ def _complex(table: Table, first: int, second: int) -> np.ndarray:
     if is_pair and (one.part, other.part) == ("re", "im"):
         return a + 1j * b
     if is_pair and one.part in ("", "abs") and other.part == "phase":
-        if (unit := canonical(other.unit)) not in ("deg", "rad"):
+        if not other.unit:
             raise ValueError(f"the phase '{other.text}' needs the unit [deg] or [rad]")
-        return np.asarray(a * np.exp(1j * (np.deg2rad(b) if unit == "deg" else b)))
+        return np.asarray(a * np.exp(1j * units.in_si(b, units.divisor(other.unit, "angle"))))
     names = f"'{one.text}' and '{other.text}'"
     raise ValueError(f"{names} are not a complex amplitude; name them 're v' and 'im v'")
 
 
 def _common(series: Series, attribute: str, given: str) -> str:
     """Return the common role or unit of columns of motion; "" if unknown."""
-    values = {getattr(column, attribute) for column, _ in series} - {""}
-    is_mixed = attribute == "unit" and not all(map(quantity_of, values))
+    is_unit = attribute == "unit"
+    values = {f"{c.unit} {c.level}".strip() if is_unit else c.role for c, _ in series} - {""}
+    is_mixed = is_unit and not all(map(quantity_of, values))
     if len(values) > 1 and (is_mixed or not given):
-        what = "quantity" if attribute == "role" else "unit"
         names = ", ".join(sorted(values))[:80]
+        what = "unit" if is_unit else "quantity"
         raise ValueError(f"columns differ in {what}: {names}; use --columns or --quantity")
     return str(values.pop()) if len(values) == 1 else ""
 
@@ -374,7 +371,7 @@ def _by_repetition(series: Series) -> tuple[np.ndarray, Floats]:
 
 
 def _drive(table: Table) -> np.ndarray:
-    at = [k for k, column in enumerate(table.columns) if column.role == DRIVE]
+    at = [k for k, column in enumerate(table.columns) if column.role == "drive"]
     if len(at) > 2:
         raise ValueError(f"{len(at)} columns hold the drive; export one of them")
     if len(at) == 2:
@@ -384,12 +381,12 @@ def _drive(table: Table) -> np.ndarray:
 
 def coordinates(table: Table) -> Floats:
     """Return the places (n, 2) in m of the columns x and y."""
-    at = table.index(X), table.index(Y)
+    at = table.index("x"), table.index("y")
     for k in at:
         if not table.columns[k].unit:
             raise ValueError(f"the column '{table.columns[k].text}' has no unit; write 'x [mm]'")
     return np.column_stack([
-        units.in_si(table.numbers[:, k], units.divisor(table.columns[k].unit, LENGTHS, "length"))
+        units.in_si(table.numbers[:, k], units.divisor(table.columns[k].unit, "length"))
         for k in at
     ])  # fmt: skip
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from meshes import reading
-from skinwave.measure import units
 from skinwave.measure.delays import align_by_references
 from skinwave.measure.recording import Given, Recording, unknown_places
+from skinwave.system import units
 from skinwave.system.formats import MEASUREMENTS, register
 from skinwave.typing import Floats
 
@@ -164,7 +164,7 @@ def _function(block: bytes) -> Function:
     y = values[:count, -1] if form not in COMPLEX else values[:count, -2:] @ np.array([1, 1j])
     time, frequency = 17, 18  # types of abscissas
     is_in_time = abscissa == time if abscissa in (time, frequency) else kind == IN_TIME
-    known, dimension = (units.TIMES, "time") if is_in_time else (units.FREQUENCIES, "frequency")
+    dimension = "time" if is_in_time else "frequency"
     alone, over = units.per_reference(unit), units.per_reference(f"{unit}/{per}")
     unit, is_per_reference = over if over[1] > alone[1] else alone
     ids = [line.strip() for line in lines[2:7]]
@@ -179,7 +179,7 @@ def _function(block: bytes) -> Function:
         at=(ends[0], ends[1]), by=(ends[2], ends[3]) if kind == RESPONSE else (0, 0),
         is_in_time=is_in_time, is_reference=any(REFERENCE.match(text) for text in ids[:2]),
         is_other=ordinate not in (0, 1, *quantities), y=y,
-        x=units.in_si(x, units.divisor(axis, known, dimension) if axis else 1.0),
+        x=units.in_si(x, units.divisor(axis, dimension) if axis else 1.0),
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ is its square. Several points become one path: the paths of all points in sequen
 focus runs one part ahead of the previous one.
 """
 
-import re
+from functools import partial
 from math import isfinite
 
 import numpy as np
@@ -18,30 +18,30 @@ from simple_model.choices import suggestion
 from simple_model.load.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, aliasing_notes, loudness, one_height
 from skinwave.scene.scene import Scene
+from skinwave.system import units
 from skinwave.system.formats import PATTERN_READERS, PATTERN_WRITERS, register
-from skinwave.system.plain_text import csv_table, number_in
+from skinwave.system.headings import parse_heading
+from skinwave.system.plain_text import csv_table
+from skinwave.system.text_table import Table, parse_table
 from skinwave.typing import Floats
 
-COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
-NEEDED = ("t_s", "x_m", "y_m")
-WORDS = {
-    "t_s": "t|time|timestamp", "point": "point|focus|id|index", "x_m": "x", "y_m": "y", "z_m": "z",
-    "intensity": "intensity|amplitude|strength",
+COLUMNS = {"t_s": "time", "point": "point", "x_m": "x", "y_m": "y", "z_m": "z",
+           "intensity": "intensity"}  # fmt: skip
+NAMES = {role: role for role in COLUMNS.values()} | {
+    "t": "time", "timestamp": "time", "focus": "point", "id": "point", "index": "point",
+    "amplitude": "intensity", "strength": "intensity",
 }  # fmt: skip
-UNITS = {"t_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "lengths": {"m": 1.0, "cm": 1e-2, "mm": 1e-3}}
 DEVICE_RATE = 40_000.0  # Hz
-MOST_ROWS = 1_000_000
-LARGEST = 1e15  # of numbers in a file: also of timestamps in us
 
 
 def read(content: bytes, options: Options, base: Scene) -> Pattern:
     """Read the pattern of a focal-point CSV."""
-    rows = _rows(content)
-    has_header = number_in(rows[0][1][0]) is None
-    columns = _columns(rows[0][1]) if has_header else _columns_of_width(rows, options.rate)
-    table = _table(rows[has_header:], columns)
+    text = reading.decode(content)
+    found = parse_table(text, ",".join(COLUMNS), partial(parse_heading, roles=NAMES))
+    has_header = any(column.text for column in found.columns)
+    table = _in_si(found, _names(found) if has_header else _names_of_width(found, options.rate))
     if not has_header and options.rate:
-        table["t_s"] = np.arange(len(rows)) / options.rate
+        table["time"] = np.arange(len(table)) / options.rate
     notes: list[str] = []
     points, counts = np.unique(table["point"], return_counts=True)
     if len(points) > MOST_FOCI or (points != np.arange(len(points))).any():
@@ -51,12 +51,12 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
         )
     ordered = table[np.argsort(table["point"], kind="stable")]
     table = ordered.reshape(len(points), -1) if not np.ptp(counts) else ordered[None]
-    times = table["t_s"] - table["t_s"][0, 0]
+    times = table["time"] - table["time"][0, 0]
     if np.ptp(counts) or np.ptp(times, axis=0).max() > 1e-9:
         raise ValueError("the times of the points differ; give all points the same times")
     if (falling := np.diff(times[0]) < 0).any():
         raise ValueError(
-            f"times decrease after t_s = {table['t_s'][0][falling.argmax()]:g}; sort them"
+            f"times decrease after t_s = {table['time'][0][falling.argmax()]:g}; sort them"
         )
     if not ((table["intensity"] >= 0) & (table["intensity"] <= 1)).all():
         raise ValueError(
@@ -71,8 +71,8 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
     elif options.rate is not None:
         notes.append("the file has times, so that --rate applies only to a file that is written")
     notes.append(f"the focus {'stays until the next sample' if options.hold else 'moves straight'}")
-    height = one_height(table["z_m"].ravel(), options, notes)
-    tacton = tacton_of(times[0], np.stack([table["x_m"], table["y_m"]], -1), table["intensity"],
+    height = one_height(table["z"].ravel(), options, notes)
+    tacton = tacton_of(times[0], np.stack([table["x"], table["y"]], -1), table["intensity"],
                       hold=options.hold)  # fmt: skip
     return Pattern(
         tacton=tacton, pressure={"drive": "pressure_squared", **height}, notes=tuple(notes)
@@ -135,78 +135,53 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     return csv_table(COLUMNS, rows, "\n"), notes
 
 
-def _rows(content: bytes) -> list[tuple[int, list[str]]]:
-    """Return line numbers and fields of the lines that are neither empty nor comments."""
-    lines = reading.decode(content).splitlines()
-    if len(lines) > MOST_ROWS:
-        raise ValueError(f"the file has more than {MOST_ROWS:,} lines; shorten the pattern")
-    kept = [(k, x) for k, x in enumerate(lines, 1) if x.strip(" ,;\t") and not x.startswith("#")]
-    if not kept:
-        raise ValueError("the file has no focal points; write one per line")
-    delimiter = max(",;\t", key=kept[0][1].count)
-    fields = ((k, line.replace('"', "").split(delimiter)) for k, line in kept)
-    return [(k, [x.strip().replace(",", ".") for x in row]) for k, row in fields]
-
-
-def _columns(words: list[str]) -> list[tuple[str, float]]:
-    """Return name and unit (in s or m) of each column of a header."""
-    columns = [_column(word) for word in words]
-    names = [name for name, _ in columns]
+def _names(table: Table) -> list[str]:
+    """Return the names of the columns of a table with headings."""
+    names = [column.role for column in table.columns]
+    if "" in names:
+        word = table.columns[names.index("")].text
+        hint = suggestion(word, COLUMNS) or f"; the columns are {','.join(COLUMNS)}"
+        raise ValueError(f"column '{word[:40]}' is unknown{hint}")
     if len(set(names)) < len(names):
         raise ValueError(f"a column is repeated in {','.join(names)[:80]}; remove one")
-    if missing := [name for name in NEEDED if name not in names]:
+    if missing := [key for key in ("t_s", "x_m", "y_m") if COLUMNS[key] not in names]:
         raise ValueError(f"column {missing[0]} is missing; the columns are {','.join(COLUMNS)}")
-    return columns
+    return names
 
 
-def _column(word: str) -> tuple[str, float]:
-    """Return the name of a column and its unit in s or m, given a word of a header."""
-    plain = re.sub(r"[\s_()\[\]]+", " ", word).strip().lower()
-    for name, words in WORDS.items():
-        units = UNITS.get(name, UNITS["lengths"] if name.endswith("_m") else {})
-        if match := re.fullmatch(rf"({words})(?: ({'|'.join(units)}))?", plain):
-            return name, units.get(match[2], 1.0)
-    hint = suggestion(word, COLUMNS) or f"; the columns are {','.join(COLUMNS)}"
-    raise ValueError(f"column '{word[:40]}' is unknown{hint}")
-
-
-def _columns_of_width(
-    rows: list[tuple[int, list[str]]], rate: float | None
-) -> list[tuple[str, float]]:
-    """Return the columns of a file without a header."""
-    width = len(rows[0][1])
+def _names_of_width(table: Table, rate: float | None, largest: float = 1e15) -> list[str]:
+    """Return the names of the columns of a table without headings."""
+    width = len(table.columns)
     if rate is None or not 2 <= width <= 4:
         raise ValueError(
             f"the file has no header; begin it with columns of {','.join(COLUMNS)}, or write only "
             "x,y[,z[,intensity]] and give the samples per second with --rate HZ"
         )
-    if not 1 / LARGEST < rate < LARGEST:
+    if not 1 / largest < rate < largest:
         raise ValueError(f"--rate is {rate} Hz; give a number of samples per second, such as 1000")
-    return [(name, 1.0) for name in ("x_m", "y_m", "z_m", "intensity")[:width]]
+    return ["x", "y", "z", "intensity"][:width]
 
 
-def _table(rows: list[tuple[int, list[str]]], columns: list[tuple[str, float]]) -> np.ndarray:
-    if not rows:
-        raise ValueError("the file has a header, but no focal points; write one per line")
-    table = np.zeros(len(rows), [(name, float) for name in COLUMNS])
-    table["intensity"] = 1.0
-    values = np.array([_numbers(line, cells, len(columns)) for line, cells in rows])
-    for (name, unit), column in zip(columns, values.T, strict=True):
-        table[name] = unit * column
-    return table
+def _in_si(
+    table: Table, names: list[str], most_rows: int = 1_000_000, largest: float = 1e15
+) -> np.ndarray:
+    """Return the columns of a table by name, in s and m if they have no unit.
 
-
-def _numbers(line: int, cells: list[str], count: int) -> list[float]:
-    if len(cells) != count:
-        raise ValueError(
-            f"line {line} has {len(cells)} columns, but the first has {count}; correct it"
-        )
-    values = [x for cell in cells if (x := number_in(cell)) is not None and abs(x) < LARGEST]
-    if len(values) < count:
-        raise ValueError(
-            f"line {line}, '{','.join(cells)[:60]}', must contain only numbers below {LARGEST:g}"
-        )
-    return values
+    `largest` limits the numbers in a file, such as timestamps in us.
+    """
+    numbers = table.numbers
+    if len(numbers) > most_rows:
+        raise ValueError(f"the file has more than {most_rows:,} rows; shorten the pattern")
+    wrong = ~(np.abs(numbers) < largest).all(axis=1) | np.iscomplex(numbers).any(axis=1)
+    for row in np.flatnonzero(wrong)[:1]:
+        raise ValueError(f"row {row + 1} must contain only numbers below {largest:g}")
+    columns = np.zeros(len(numbers), [(name, float) for name in COLUMNS.values()])
+    columns["intensity"] = 1.0
+    for name, column, values in zip(names, table.columns, numbers.real.T, strict=True):
+        dimension = {"time": "time", "x": "length", "y": "length", "z": "length"}.get(name)
+        divisor = units.divisor(column.unit, dimension or "number") if column.unit else 1.0
+        columns[name] = units.in_si(values, divisor)
+    return columns
 
 
 register(PATTERN_READERS, ".csv", function=read, largest=128_000_000)

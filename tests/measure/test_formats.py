@@ -15,9 +15,9 @@ from test_tables import COUNT, OTHER, TONE, T, amplitude, assert_tone, rows
 from simple_model import Response
 from skinwave.measure import Measurement
 from skinwave.measure.reading import read
-from skinwave.measure.units import canonical, motion_divisor, quantity_of
 from skinwave.measure.writing import write
 from skinwave.results.exports import write_probes
+from skinwave.system.units import canonical, motion_divisor, quantity_of
 
 SAMPLES = 10_000.0  # Hz, of the tone
 X = np.arange(4) * 5e-3  # m

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skinwave.measure.reading import parse_places, read
-from skinwave.measure.text import parse_table
+from skinwave.system.text_table import parse_table
 
 RATE, COUNT, START = 10_000.0, 1200, -0.02
 T = START + np.arange(COUNT) / RATE
@@ -140,7 +140,7 @@ def test_clocks_go_on_after_a_full_hour_and_after_midnight(hour):
     times = 0.025 * np.arange(40)
     first = datetime(2026, 1, 5, hour, 59, 59, 500_000)
     rows = (f"{(first + timedelta(seconds=t)).isoformat(timespec='microseconds')},1" for t in times)
-    table = parse_table("\n".join(["time,v [mm/s]", *rows]))
+    table = parse_table("\n".join(["time,v [mm/s]", *rows]), "")
     np.testing.assert_allclose(table.numbers[:, 0], times, atol=1e-9)
 
 

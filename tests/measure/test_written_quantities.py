@@ -12,7 +12,7 @@ from test_tables import COUNT, RATE, TONE, T, assert_tone, rows
 
 from skinwave.measure.lines import lines_of
 from skinwave.measure.reading import read
-from skinwave.measure.units import motion_divisor, quantity_of, split_level
+from skinwave.system.units import motion_divisor, quantity_of, split_level
 
 F = np.arange(100.0, 200.0, 5.0)
 H = 4.0 / (1 + np.abs(F - 140) / 10) * -1j  # 4 at 140 Hz

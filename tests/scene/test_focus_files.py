@@ -230,13 +230,13 @@ REFUSED = {
     "no complete grid": table(NAMES, RMS).rsplit("\n", 1)[0],
     "not finite numbers": table(NAMES, np.where(np.hypot(X, Y) < 1, np.nan, RMS)),
     "x has no unit": table("x,y [mm],p_rms [Pa]", RMS),
-    "x is in furlong": table("x [furlong],y [mm],p_rms [Pa]", RMS),
+    "'furlong' is not a unit of length": table("x [furlong],y [mm],p_rms [Pa]", RMS),
     "no line of names": table(NAMES, RMS).split("\n", 1)[1],
     "no column has a known name": table("x [mm],y [mm],v [Pa]", RMS),
     "2 columns hold the sound pressure": table(NAMES + ",p_rms_pa", RMS, RMS),
     "0 columns hold the imaginary part": table("x [mm],y [mm],Re(p) [Pa]", RMS),
     "several values of z": table("x [mm],y [mm],z [mm],p_rms [Pa]", X + Y, RMS),
-    "row 3 does not have 3 numbers": table(NAMES, RMS).replace("\n", "\n1,2\n").replace(
+    "line 4 has 2 cells instead of 3": table(NAMES, RMS).replace("\n", "\n1,2\n").replace(
         "\n1,2\n", "\n", 2),
     "41 x 1 samples": "\n".join([NAMES, *(f"{x},0,{np.exp(-x**2 / 60)}" for x in LINE)]),
     "some of them above 0": table(NAMES, 0 * RMS),

@@ -2,53 +2,48 @@
 
 The last rows of a file show the delimiter, the decimal sign and the columns of numbers. The table
 begins at the first row with numbers in these columns. The line above has names, or units below
-another line with names. All other lines, and cells outside these columns, are notes.
+another line with names. Other lines above, and cells outside these columns, are notes. Lines that
+begin with # or % below are comments.
 """
 
 import csv
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, time
 from itertools import zip_longest
-from pathlib import Path
 
 import numpy as np
 
-from meshes.reading import read_exported_text
-from skinwave.measure.headers import TIME, UNITS, Column, X, Y, parse_heading
-from skinwave.measure.labview import read_lvm
-from skinwave.measure.recording import Given, Recording
-from skinwave.measure.table import EXAMPLE, Notes, Table, coordinates, recording_of
-from skinwave.measure.units import canonical, quantity_of, split_level
-from skinwave.system.formats import MEASUREMENTS, register
+from skinwave.system.headings import Column, parse_heading
 from skinwave.system.plain_text import number_in
+from skinwave.system.units import dimension_of, quantity_of, split_level
 from skinwave.typing import Floats
 
-LARGEST = 256_000_000  # bytes
+Notes = list[tuple[str, str]]
 SAMPLE_ROWS = 100  # at the end of a file, which show the layout
-_LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
 
 
-def read(path: Path, given: Given) -> Recording:
-    """Return the recording in a text file. Raises a ValueError if it has no table of motion."""
-    text = read_exported_text(path, LARGEST)
-    lvm_first_line = "LabVIEW Measurement"  # whatever the suffix of the file
-    is_lvm = text.startswith(lvm_first_line)
-    return read_lvm(text, given) if is_lvm else recording_of(parse_table(text), given)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """Columns, their numbers (n, c), and the notes above them: pairs of key and value."""
 
+    columns: tuple[Column, ...]
+    numbers: Floats
+    notes: tuple[tuple[str, str], ...] = ()
 
-def read_places(path: Path) -> Floats:
-    """Return places (p, 2) in m from the columns x and y, or from two columns in mm."""
-    table = parse_table(read_exported_text(path, LARGEST))
-    if len(table.columns) == 2 and not any(column.text for column in table.columns):
-        table = replace(table, columns=(parse_heading("x [mm]"), parse_heading("y [mm]")))
-    roles = [column.role for column in table.columns]
-    if roles.count(X) != 1 or roles.count(Y) != 1:
-        raise ValueError(f"{path}: a file of places needs the columns x [mm] and y [mm]; add them")
-    return coordinates(table)
+    def index(self, role: str) -> int:
+        """Return the index of the only column with a role, or -1."""
+        at = [k for k, column in enumerate(self.columns) if column.role == role]
+        if len(at) > 1:
+            raise ValueError(f"{len(at)} columns hold the {role}; export one of them")
+        return at[0] if at else -1
+
+    def note(self, key: re.Pattern[str]) -> str:
+        """Return the first value of a note whose key matches, or ""."""
+        return next((value for name, value in self.notes if key.fullmatch(name) and value), "")
 
 
 @dataclass(frozen=True)
@@ -72,12 +67,18 @@ class _Layout:
         return None not in values and any(_is_number(cells[k]) for k in self.numeric)
 
 
-def parse_table(text: str) -> Table:
-    """Return the table in a text. Raises a ValueError with the number of the first wrong line."""
+def parse_table(
+    text: str, example: str, heading: Callable[[str, str], Column] = parse_heading
+) -> Table:
+    """Return the table in a text.
+
+    `example` shows a header in messages; `heading` returns the column of a heading and a unit.
+    Raises a ValueError with the number of the first wrong line.
+    """
     lines = text.rstrip().splitlines()
-    last = [line for line in lines[-4 * SAMPLE_ROWS :] if line.strip()][-SAMPLE_ROWS:]
-    if not any(line.strip() and line.lstrip()[0] not in "#%" for line in lines):
-        raise ValueError(f"the file has no table; give a header such as {EXAMPLE}, and numbers")
+    last = [line for line in lines[-4 * SAMPLE_ROWS :] if not _is_comment(line)][-SAMPLE_ROWS:]
+    if all(map(_is_comment, lines)):
+        raise ValueError(f"the file has no table; give a header such as {example}, and numbers")
     problems = []
     for layout in _layouts(last):
         first = next((k for k, line in enumerate(lines) if layout.is_row(line)), -1)
@@ -90,12 +91,12 @@ def parse_table(text: str) -> Table:
             continue
         row = layout.cells(lines[first])
         layout = _with_shorter(layout, lines[first : first + SAMPLE_ROWS], names)
-        columns = _columns(names, units, layout, row, notes)
+        columns = _columns(names, units, layout, row, notes, heading)
         numbers = _numbers(lines, first, layout, names, notes)
         for k, cell in enumerate(row[c] for c in layout.numeric):
             if _clock_seconds(cell) is not None:
                 numbers[:, k] -= numbers[0, k]
-                columns[k] = replace(columns[k], role=TIME, unit="s")
+                columns[k] = replace(columns[k], role="time", unit="s")
         return Table(columns=tuple(columns), numbers=numbers, notes=tuple(notes))
     problem = "the file has a header but no numbers; export it again"
     if len(last) > 1:
@@ -105,6 +106,11 @@ def parse_table(text: str) -> Table:
     raise ValueError([*problems, problem][0])
 
 
+def _is_comment(line: str) -> bool:
+    """Whether a line is empty or a comment."""
+    return line.strip()[:1] in ("", "#", "%")
+
+
 def _layouts(rows: list[str]) -> Iterator[_Layout]:
     """Yield the layouts that fit most of the last rows of a file."""
     for delimiter in "\t;, ":
@@ -112,8 +118,7 @@ def _layouts(rows: list[str]) -> Iterator[_Layout]:
             continue
         has_commas = any(
             _with_point(cell) != cell
-            for line in rows if "," in line and line.lstrip()[0] not in "#%"
-            for cell in _cells(line, delimiter)
+            for line in rows if "," in line for cell in _cells(line, delimiter)
         )  # fmt: skip
         split = [_cells(line, delimiter, has_commas) for line in rows]
         widths = [len(cells) for cells in split[-3:]]
@@ -162,11 +167,14 @@ def _is_number(cell: str) -> bool:
     return value is not None and bool(np.isfinite(value))
 
 
-def _value(cell: str) -> float | None:
+def _value(cell: str) -> complex | None:
     """Return the number in a cell: nan if missing, inf if overloaded, None if it is text."""
     number = number_in(cell)
     if number is not None:
         return number
+    if cell.endswith(("i", "j")) and cell[0] in "+-.0123456789":
+        with suppress(ValueError):
+            return complex(cell.replace("i", "j"))
     missing = (
         "", "-", "--", "---", "na", "n/a", "#n/a", "null", "none", "nan", "1.#qnan", "-1.#ind",
         "1.#ind", "missing", "invalid",
@@ -225,17 +233,22 @@ def _header(above: list[str], layout: _Layout) -> tuple[list[str], list[str], No
 
 
 def _columns(
-    names: list[str], units: list[str], layout: _Layout, first: list[str], notes: Notes
+    names: list[str],
+    units: list[str],
+    layout: _Layout,
+    first: list[str],
+    notes: Notes,
+    heading: Callable[[str, str], Column],
 ) -> list[Column]:
     """Return the columns of numbers; skip text, but refuse it if the heading implies numbers."""
     for k, cell in enumerate(first[: len(names)]):
         if k in layout.numeric or not (names[k] and cell) or _is_number(cell):
             continue
-        column = parse_heading(names[k], units[k])
+        column = heading(names[k], units[k])
         if column.role or quantity_of(column.unit):
             raise ValueError(f"the column '{names[k][:40]}' has text, '{cell[:40]}'; use numbers")
         notes.append(("remark", f"the column '{names[k][:40]}' holds text and is left out"))
-    return [parse_heading(names[k], units[k]) for k in layout.numeric]
+    return [heading(names[k], units[k]) for k in layout.numeric]
 
 
 def _is_title(cells: list[str], count: int) -> bool:
@@ -260,8 +273,7 @@ def _heading_cells(line: str, delimiter: str) -> list[str]:
 
 def _are_units(cells: list[str]) -> bool:
     return any(cells) and all(
-        canonical(split_level(cell)[0]) in UNITS or re.fullmatch(r"[\[(].*[\])]", cell) is not None
-        for cell in cells
+        dimension_of(split_level(cell)[0]) or re.fullmatch(r"[\[(].*[\])]", cell) for cell in cells
     )
 
 
@@ -277,8 +289,10 @@ def _numbers(
     lines: list[str], first: int, layout: _Layout, names: list[str], notes: Notes
 ) -> Floats:
     """Return the numbers (n, c) from line `first` on; other cells are added to the notes."""
-    rows, width, delimiter = lines[first:], len(names), layout.delimiter
-    if delimiter == "," and any(_LEADING_ZERO.search(line) for line in rows[:SAMPLE_ROWS]):
+    width, delimiter = len(names), layout.delimiter
+    rows = ["" if line[:1] in ("#", "%") else line for line in lines[first:]]
+    leading_zero = re.compile(r",0\d+(?=,|$)")
+    if delimiter == "," and any(map(leading_zero.search, rows[:SAMPLE_ROWS])):
         raise ValueError(f"line {first + 1} has decimal commas between commas; use semicolons")
     text = "\n".join(rows)
     if len(layout.numeric) == width > 1 and not (layout.has_commas and "." in text):
@@ -295,7 +309,7 @@ def _numbers(
     ])  # fmt: skip
 
 
-def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes) -> list[float]:
+def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes) -> list[complex]:
     """Return the numbers of a line, and add its other cells to the notes."""
 
     def refuse(cell: str, problem: str) -> ValueError:
@@ -320,7 +334,3 @@ def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes
     if others and not any(names[k] for k in others):
         notes.append((cells[others[0]].lower(), " ".join(cells[k] for k in others[1:])))
     return values
-
-
-register(MEASUREMENTS, ".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", function=read, name="text",
-         choices=("columns",))  # fmt: skip
