@@ -4,6 +4,7 @@
 `decibel`, `percent`, and `stated_error` for an expected relative error.
 """
 
+from collections.abc import Sequence
 from math import floor, isfinite, log10
 
 EN_DASH = "\u2013"
@@ -86,6 +87,16 @@ def plural(number: int, thing: str) -> str:
     ('1 warning', '1,200 warnings')
     """
     return f"{number:,} {thing}{'s' * (number != 1)}"
+
+
+def first_few(names: Sequence[str], most: int = 3) -> str:
+    """Format a list of names, of which at most a few are given.
+
+    >>> first_few(["a", "b", "c"], 2)
+    'a, b and 1 more'
+    """
+    more = len(names) - most
+    return ", ".join(names[:most]) + f" and {more} more" * (more > 0)
 
 
 def stated_error(error: float, least: float = 0.005) -> str:

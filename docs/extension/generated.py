@@ -107,18 +107,12 @@ def scene_keys() -> str:
         "load": [Load], "placement": [Placement], "probes": [Scene],
     }  # fmt: skip
     inner = {
-        "tacton.rhythm": (scene_keys.PULSES, Rhythm),
-        "tacton.signal": (scene_keys.SIGNAL, Signal),
-        "body.material": (scene_keys.MATERIAL, Material),
-        "body.material.prony": (scene_keys.PRONY, PronyTerm),
-        "body.layers": (scene_keys.LAYER, Layer),
-        "body.relief": (scene_keys.RELIEF, Relief),
-        "body.bone": (scene_keys.BONE, Phalanx),
-        "body.mounting": (scene_keys.MOUNTING, Mounting),
-        "load.support_motion": (scene_keys.SUPPORT_MOTION, SupportMotion),
-    }
+        "tacton.rhythm": Rhythm, "tacton.signal": Signal, "body.material": Material,
+        "body.material.prony": PronyTerm, "body.layers": Layer, "body.relief": Relief,
+        "body.bone": Phalanx, "body.mounting": Mounting, "load.support_motion": SupportMotion,
+    }  # fmt: skip
     parts = [_section(name, sections[name], classes) for name, classes in records.items()]
-    parts += [_section(name, keys, [record]) for name, (keys, record) in inner.items()]
+    parts += [_section(name, scene_keys.TABLES[name], [own]) for name, own in inner.items()]
     if missing := sections.keys() - records.keys():
         raise ValueError(f"The section {', '.join(missing)} has no record. Add it to `records`.")
     return "\n".join(parts)

@@ -120,7 +120,7 @@ def _page(options: argparse.Namespace) -> int:
 
 def _map(options: argparse.Namespace) -> int:
     from skinwave.results.surface import quantity_map
-    from skinwave.scene.keys import depth_of
+    from skinwave.scene.receptors import depth_of
     from skinwave.studies.report import map_sentences, write_map
 
     if options.source.is_dir():

@@ -16,6 +16,7 @@ import numpy as np
 
 from meshes import reading, subprocess_call
 from meshes.tetmesh import MeshError
+from simple_model.numbers import first_few
 from simple_model.quantities import QUANTITIES
 from skinwave.measure import universal
 from skinwave.measure.delays import align_by_references
@@ -257,8 +258,7 @@ def _motion(arrays: Arrays) -> str:
 
 
 def _list(names: Iterable[str]) -> str:
-    shown = [str(name)[:40] for name in names]
-    return ", ".join(shown[:12]) + (f" and {len(shown) - 12} more" if len(shown) > 12 else "")
+    return first_few([name[:40] for name in names], 12)
 
 
 def _stem(name: str) -> str:

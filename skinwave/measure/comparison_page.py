@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from simple_model.numbers import (
     as_sentence,
+    first_few,
     percent,
     plural,
     share_of,
@@ -212,10 +213,7 @@ def _where(comparison: MeasuredComparison, column: ModelColumn) -> str:
     away = np.where(beyond, np.abs(comparison.lines.mean - column.model), 0).max(axis=1)
     lines = [k for k in np.argsort(-away, kind="stable") if beyond[k].any()]
     names, places = list(comparison.names), beyond.shape[1]
-    most_named = 3  # lines in a sentence
-    shown = [f"{names[k]} at {beyond[k].sum()} of {places} places" for k in lines[:most_named]]
-    more = len(lines) - len(shown)
-    return ", ".join(shown) + (f" and {plural(more, 'more line')}" if more else "")
+    return first_few([f"{names[k]} at {beyond[k].sum()} of {places} places" for k in lines])
 
 
 def remarks(comparison: MeasuredComparison) -> list[str]:

@@ -4,13 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simple_model.numbers import as_sentence, percent, plural, share_of, significant
+from simple_model.numbers import as_sentence, first_few, percent, plural, share_of, significant
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.fit import Fit
 from skinwave.measure.inspection import flaws
 from skinwave.measure.intervals import Estimate
 from skinwave.measure.misfit import NOT_DESCRIBED
-from skinwave.measure.observed import first_names
 from skinwave.measure.parameters import DELAY
 
 
@@ -84,7 +83,7 @@ def _of_solution(result: Fit) -> Iterator[str]:
     least_share = 1e-3  # of the measured power in lines that are not fitted
     if (share := sum(line.share for line in strong)) > least_share:
         yield (
-            f"the lines {first_names(tuple(line.name for line in strong))} are not fitted: they "
+            f"the lines {first_few([line.name for line in strong])} are not fitted: they "
             f"have {percent(share)} of the measured power, but are negligible in the model; check "
             "drive and path of the scene"
         )

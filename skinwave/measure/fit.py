@@ -17,8 +17,9 @@ from skinwave.measure.predicted import Target, target, with_reduction
 from skinwave.measure.search import Problem, Solution, minimise
 from skinwave.planning.plan import model_from_rest
 from skinwave.scene.distributions import Distribution
+from skinwave.scene.dotted_keys import value_at
 from skinwave.scene.file import to_table, with_distributions
-from skinwave.scene.keys import DERIVED, LOSSES, SCALES, value_at, write_material
+from skinwave.scene.keys import DERIVED, SCALES, write_material
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import spreads_of
 from skinwave.scene.variation import with_values
@@ -156,7 +157,7 @@ def _scaled_keys(table: Mapping[str, Any], place: str, scale: str) -> Iterator[s
     plain = write_material(solid)
     losses = set(_changed_keys(plain, write_material(solid.scaled(loss=2.0)), place))
     moduli = _changed_keys(plain, write_material(solid.scaled(modulus=2.0)), place)
-    yield from losses if scale == LOSSES else (key for key in moduli if key not in losses)
+    yield from losses if SCALES[scale] == "loss" else (key for key in moduli if key not in losses)
 
 
 def _changed_keys(one: Any, other: Any, path: str) -> Iterator[str]:

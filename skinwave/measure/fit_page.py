@@ -33,8 +33,6 @@ from skinwave.system.document import (
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
-FITTED, RESIDUAL = BLUE, ORANGE
-
 
 def write(folder: Path, result: Fit) -> None:
     """Write index.html, the fitted scene.toml, estimates.csv, fit.json, fit.npz and figures."""
@@ -203,8 +201,8 @@ def _waveforms(result: Fit) -> Figure:
     axes = figure.subplots(len(places), 1, sharex=True, squeeze=False)[:, 0]
     for ax, p in zip(axes, places.tolist(), strict=True):
         for values, name, colour, width in (
-            (data.values, "measured", "#bbbbbb", 2.4), (fitted, "fitted", FITTED, 1.1),
-            (data.values - fitted, "measured minus fitted", RESIDUAL, 0.8),
+            (data.values, "measured", "#bbbbbb", 2.4), (fitted, "fitted", BLUE, 1.1),
+            (data.values - fitted, "measured minus fitted", ORANGE, 0.8),
         ):  # fmt: skip
             ax.plot(t, record.per_unit * values[part, p], color=colour, lw=width, label=name)
         ax.set_title(result.measured.place_name(p), loc="left", fontsize="medium")
@@ -242,11 +240,11 @@ def residual_figure(result: Fit) -> Figure:
     left.plot(scale * data.axis[thin], residual[thin], ".", ms=2 if data.is_in_time else 5,
               color=ink, alpha=0.4)  # fmt: skip
     for y in (-2, 2):
-        left.axhline(y, color=RESIDUAL, lw=0.8, ls="--")
+        left.axhline(y, color=ORANGE, lw=0.8, ls="--")
     left.set(xlabel=label, ylabel="residual, standard errors")
     for right in others:
         right.bar(np.arange(1, len(each) + 1), each, color=ink, alpha=0.6)
-        right.axhspan(-band, band, color=FITTED, alpha=0.2)
+        right.axhspan(-band, band, color=BLUE, alpha=0.2)
         right.set_xlabel("lag, samples" if data.is_in_time else "lag, lines")
         right.set_ylabel("autocorrelation")
     return figure

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from simple_model.numbers import first_few
 from simple_model.quantities import Quantity, quantity
 from skinwave.typing import Floats
 
@@ -118,9 +119,7 @@ class Measurement:
 
     def place_names(self, places: np.ndarray) -> str:
         """Return the names of the first few of some places."""
-        most_named = 5  # places in a message
-        names = ", ".join(self.place_name(int(p)) for p in places[:most_named])
-        return names + f" and {len(places) - most_named} more" * (len(places) > most_named)
+        return first_few([self.place_name(int(p)) for p in places], 5)
 
 
 def strongest(size: Floats, most: int) -> np.ndarray:

@@ -12,17 +12,11 @@ import numpy as np
 
 from simple_model import resolved_lines
 from simple_model.load.line_names import line_names
-from simple_model.numbers import plural
+from simple_model.numbers import first_few, plural
 from simple_model.response import SETTLE, fit_lines
 from skinwave.measure.lines import MeasuredLines, as_response, holm, lines_of, measurable
 from skinwave.measure.measurement import Measurement
-from skinwave.measure.predicted import (
-    SAME_LINE,
-    Predict,
-    Target,
-    predicted_lines,
-    predicted_waveforms,
-)
+from skinwave.measure.predicted import Predict, Target, predicted_lines, predicted_waveforms
 from skinwave.typing import Complex, Floats
 
 KINDS = ("waveforms", "lines", "amplitudes")
@@ -81,19 +75,14 @@ class Data:
     whitening: Floats | None = None
     lines: tuple[str, ...] = ()  # fitted lines
     left_out: tuple[LeftOutLine, ...] = ()  # lines of the load that are not fitted
-    freedom: float = np.inf  # degrees of freedom of the errors; 0 if noise and misfit are one
-    # apart
+    # Degrees of freedom of the errors; 0 if noise and misfit cannot be told apart.
+    freedom: float = np.inf
     rough: "Data | None" = None  # cheaper data of the same record, for the search
 
     @property
     def is_in_time(self) -> bool:
         """Whether the data are waveforms."""
         return self.kind == "waveforms"
-
-    @property
-    def has_sign(self) -> bool:
-        """Whether the values depend on the sign of the measurement."""
-        return self.kind != "amplitudes"
 
     def whiten(self, values: Floats) -> Floats:
         """Scale values (n, s) by their errors and decorrelate them."""
@@ -116,7 +105,7 @@ def load_lines(measured: Measurement, aim: Target) -> LoadLines:
     load, lost = line_names(aim.scene.pressure), dict[str, float]()
     if measured.is_spectrum:
         away = np.abs(measured.frequencies[:, None] - load.frequencies).min(axis=0)
-        near = (away <= SAME_LINE * load.frequencies) & measurable(measured, load.frequencies)
+        near = (away <= aim.same_line * load.frequencies) & measurable(measured, load.frequencies)
         kept = {load.names[k]: float(load.frequencies[k]) for k in np.flatnonzero(near)}
     else:
         kept, lost = resolved_lines(aim.scene.pressure, as_response(measured))
@@ -151,18 +140,11 @@ def _not_predicted(
     return sorted(each, key=lambda line: -line.share)
 
 
-def first_names(names: tuple[str, ...]) -> str:
-    """Return the first few names, and the number of the others."""
-    most_named = 3  # lines in a sentence
-    more = len(names) - most_named
-    return ", ".join(names[:most_named]) + f" and {more} more" * (more > 0)
-
-
 def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
     """Return complex amplitudes in two parts, or moduli with noise (Rice's distribution)."""
     lines = load_lines(measured, aim)
     if lines.unresolved:
-        names = first_names(lines.unresolved)
+        names = first_few(lines.unresolved)
         raise ValueError(f"the record is too short to resolve {names}; use --to waveforms")
     if not lines.names:
         raise ValueError("the measurement resolves no line of the scene's load; check the Tacton")
@@ -225,7 +207,7 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
         )  # fmt: skip
         return replace(data, lines=lines.names, left_out=lines.left_out)
     if aim.record.is_steady:
-        names = first_names(lines.unresolved)
+        names = first_few(lines.unresolved)
         problem = f"are too short to resolve {names}" if names else "have a transient"
         cure = "a longer record" if names else "fit lines"
         raise ValueError(f"the waveforms {problem}, but {aim.model} computes only the steady "

@@ -19,14 +19,9 @@ from skinwave.scene.variation import with_values
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
-GAIN, DELAY, OFFSET_X, OFFSET_Y = "gain", "delay_ms", "offset_x_mm", "offset_y_mm"
-OF_MEASUREMENT = (GAIN, DELAY, OFFSET_X, OFFSET_Y)  # not keys of a scene
-PRESSURE, FORCE = "focus.peak_pressure_pa", "load.force_n"  # linear waves are proportional to them
+GAIN, DELAY = "gain", "delay_ms"
+OF_MEASUREMENT = (GAIN, DELAY, "offset_x_mm", "offset_y_mm")  # not keys of a scene
 Values = Mapping[str, float]
-OPERATORS: dict[type, Callable[[float, float], float]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.Pow: math.pow,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,11 +128,15 @@ def _tied_value(key: str, expression: str, values: Values) -> float:
 
 def _evaluate(node: ast.AST) -> float:
     """Return the value of an expression of numbers with + - * / and **."""
+    operators: dict[type, Callable[[float, float], float]] = {
+        ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+        ast.Div: operator.truediv, ast.Pow: math.pow,
+    }  # fmt: skip
     match node:
         case ast.Constant(value=int() | float() as value):
             return value
         case ast.BinOp(left=left, op=op, right=right):
-            return OPERATORS[type(op)](_evaluate(left), _evaluate(right))
+            return operators[type(op)](_evaluate(left), _evaluate(right))
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return -_evaluate(operand)
     raise ValueError

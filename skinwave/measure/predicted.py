@@ -18,17 +18,7 @@ from simple_model.load.spectrum import merge_lines
 from simple_model.quantities import Quantity
 from simple_model.response import fit_lines
 from skinwave.bodies.analytic import compliance
-from skinwave.measure.parameters import (
-    DELAY,
-    FORCE,
-    GAIN,
-    OFFSET_X,
-    OFFSET_Y,
-    PRESSURE,
-    Parameters,
-    Values,
-    of_scene,
-)
+from skinwave.measure.parameters import DELAY, GAIN, Parameters, Values, of_scene
 from skinwave.models import Model, named, parametric
 from skinwave.models.covering import covering, try_shared_body
 from skinwave.models.flat_body import fields_read
@@ -37,23 +27,27 @@ from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.parametric import ParametricBody
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import SAMPLE_RATE, Scene
+from skinwave.scene.spreads import PRESSURE
 from skinwave.scene.variation import with_values
 from skinwave.system.effort import Progress
 from skinwave.typing import Complex, Floats
 
 Predict = Callable[[Values], np.ndarray]
-SAME_LINE = 1e-3  # of a frequency
 
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """A scene with variable keys, a model, and the quantity that it predicts at places (p, 2)."""
+    """A scene with variable keys, a model, and the quantity that it predicts at places (p, 2).
+
+    Frequencies that differ by less than a share `same_line` are of one line.
+    """
 
     scene: Scene
     model: str
     quantity: Quantity
     places: Floats
     reduced: ParametricBody | None = None
+    same_line: float = 1e-3
 
     @property
     def record(self) -> Model:
@@ -72,12 +66,12 @@ class Target:
         """Key and value of the strength of the load: pressure of a device, or force."""
         if self.scene.load.of_kind.is_of_device:
             return PRESSURE, self.scene.pressure.peak_pressure
-        return FORCE, self.scene.load.force
+        return "load.force_n", self.scene.load.force
 
     def scene_with(self, values: Values) -> Scene:
         """Return the scene with these values, and with probes at the places plus their offset."""
         changed = with_values(self.scene, of_scene(values)) if of_scene(values) else self.scene
-        offset = np.array([values.get(OFFSET_X, 0.0), values.get(OFFSET_Y, 0.0)]) / 1e3
+        offset = np.array([values.get(f"offset_{axis}_mm", 0.0) for axis in "xy"]) / 1e3
         places = [(float(x), float(y)) for x, y in self.places + offset]
         return replace(changed, probes=tuple(places), depth=0.0, quantity=self.quantity.name)
 
@@ -96,7 +90,7 @@ class Target:
         """Return a mask (f,) of the lines that are predicted; a reduced body omits weak ones."""
         known = frequencies if self.reduced is None else self.reduced.frequencies
         away = np.abs(known[:, None] - frequencies)
-        return np.asarray((away <= SAME_LINE * frequencies).any(axis=0))
+        return np.asarray((away <= self.same_line * frequencies).any(axis=0))
 
     def _is_scaled(self, values: Values) -> bool:
         return self.strength[0] in values and self.strength[0] in self.linear
@@ -132,9 +126,16 @@ def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
     """Return a function of the values that predicts complex amplitudes (f, p), SI, of Re a exp(2 pi
     i f t) at frequencies (f,) in Hz. It raises a ValueError if the load has no line at one of them.
     """
-    unscaled = _flat_lines if aim.record.is_infinite else _sampled_lines
-    unscaled = _reduced_lines if aim.reduced else unscaled
-    base = _from_cache(lambda values: unscaled(aim, values, frequencies))
+
+    def unscaled(values: Values) -> Complex:
+        if aim.reduced:
+            f, a = parametric.lines(aim.reduced, values)
+            return np.asarray(a[np.abs(f[:, None] - frequencies).argmin(axis=0)])
+        if aim.record.is_infinite:
+            return _flat_lines(aim, values, frequencies)
+        return np.asarray(fit_lines(compute(aim.scene_with(values), aim.model), frequencies)[0])
+
+    base = _from_cache(unscaled)
 
     def predict(values: Values) -> Complex:
         late = np.exp(-2j * pi * frequencies * values.get(DELAY, 0.0) / 1e3)
@@ -174,7 +175,7 @@ def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     """Return lines from wavenumber integrals."""
     f, a = _flat_lines_of(aim.scene_with(values))
     at = np.abs(f[:, None] - frequencies).argmin(axis=0)
-    apart = np.abs(f[at] - frequencies) > SAME_LINE * frequencies
+    apart = np.abs(f[at] - frequencies) > aim.same_line * frequencies
     if apart.any():
         raise ValueError(
             f"the load has no line at the measured {frequencies[apart][0]:.1f} Hz if "
@@ -196,18 +197,6 @@ def _flat_lines_of(scene: Scene) -> tuple[Floats, Complex]:
     each = [field_lines(*part, points, threshold=weakest) for part in parts]
     frequencies, amplitudes = zip(*each, strict=True)
     return merge_lines(np.concatenate(frequencies), np.vstack(amplitudes)[..., 0])
-
-
-def _reduced_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
-    """Return lines of a body that is reduced once."""
-    assert aim.reduced is not None
-    f, a = parametric.lines(aim.reduced, values)
-    return np.asarray(a[np.abs(f[:, None] - frequencies).argmin(axis=0)])
-
-
-def _sampled_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
-    """Return lines fitted to the waveforms of any model."""
-    return np.asarray(fit_lines(compute(aim.scene_with(values), aim.model), frequencies)[0])
 
 
 def _history(aim: Target, values: Values, last: float) -> CubicSpline:

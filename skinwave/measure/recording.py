@@ -20,7 +20,6 @@ FACTOR = re.compile(  # names of numbers that scale counts
     r"counts?_per_\w+|units?_?per_?\w+|per_(count|bit|lsb))($|[ _.:=(\[-])",
     re.IGNORECASE,
 )
-OF_COUNT = re.compile(r"(?<!full.)scal|fa[ck]tor|mult|cal|lsb|slope|(?<!counts)_per", re.IGNORECASE)
 LARGEST_GAPS = 0.1  # of the samples
 
 
@@ -136,7 +135,8 @@ def _check_counts(recording: Recording, given: Given, unit: str, remarks: list[s
         text = f"'{name[:40]}' = {factor:g}"
         values = recording.values[~np.isnan(recording.values)]
         if (values == np.rint(values.real)).all():
-            number = factor if OF_COUNT.search(name) else 0.01
+            of_count = r"(?<!full.)scal|fa[ck]tor|mult|cal|lsb|slope|(?<!counts)_per"
+            number = factor if re.search(of_count, name, re.IGNORECASE) else 0.01
             cure = f'give the motion of 1, such as --unit "{number:g} {unit}"'
             raise ValueError(f"{text} seems to be the factor of whole numbers; {cure}")
         remarks.append(f"{text} is not applied; if values lack it, give a --unit that contains it")

@@ -145,7 +145,7 @@ def _may_be_flipped(problem: Problem, best: Start, candidates: Floats) -> bool:
     data, parameters = problem.data, problem.parameters
     linear = [each for each in parameters.free if each.key in problem.linear]
     values = parameters.values(best.ended)
-    if not data.has_sign or any(each.low < 0 for each in linear):
+    if data.kind == "amplitudes" or any(each.low < 0 for each in linear):
         return any(values[each.key] < 0 for each in linear)
     flipped = replace(problem, data=replace(data, values=-data.values))
     other = refine(flipped, best_candidate(flipped, np.vstack([candidates, best.ended])))

@@ -19,16 +19,7 @@ from skinwave.system.formats import MEASUREMENTS, register
 from skinwave.typing import Floats
 
 IN_TIME, RESPONSE = 1, 4  # types of functions that have a phase
-COMPLEX = (5, 6)  # types of values
-SET_TAG = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")  # line before and after each set
-SET_TYPE = re.compile(rb"[^\r\n]*[\r\n]+ *(\d+)")
-HEADER = re.compile(rb"(?:[^\r\n]*(?:\r\n|\r|\n)){13}")
-NUMBER = re.compile(
-    rb"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[ED][-+]?\d+|[-+]\d{3}(?![\d.]))?|nan|inf)", re.IGNORECASE
-)
-SHORT = re.compile(r"(\d)([-+]\d{3})$")  # "1.5-100" of Fortran
 AXES = {"x": 1, "y": 2, "z": 3}  # z is out of the body, towards a vibrometer above it
-REFERENCE = re.compile(r"ref(erence)?\d*\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,7 +96,8 @@ def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], f
     largest = 1_000_000_000  # bytes
     with reading.open_regular(path, largest) as file:
         content = file.read()
-    tags = [match.start() for match in SET_TAG.finditer(content)]
+    tag = rb"    -1(?=[\r\n]|\Z| {74})"  # line before and after each set
+    tags = [match.start() for match in re.finditer(tag, content)]
     if len(tags) % 2:
         raise ValueError("the file ends within a set; export it again")
     functions, types, per_metre = [], set[int](), 1.0
@@ -113,7 +105,7 @@ def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], f
     function, nodes, length_unit = 58, (15, 2411), 164  # types of sets
     for begin, end in zip(tags[::2], tags[1::2], strict=True):
         block = content[begin:end]
-        kind = int(found[1]) if (found := SET_TYPE.match(block)) else 0
+        kind = int(found[1]) if (found := re.match(rb"[^\r\n]*[\r\n]+ *(\d+)", block)) else 0
         types.add(kind)
         if kind == function:
             functions.append(_function(block))
@@ -132,7 +124,7 @@ def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], f
 
 def _function(block: bytes) -> Function:
     """Return the function in the text of a set 58, or of a set 58b with binary values."""
-    head = HEADER.match(block)
+    head = re.match(rb"(?:[^\r\n]*(?:\r\n|\r|\n)){13}", block)
     if not head:
         raise ValueError("a set 58 ends within its header; export it again")
     lines = head[0].decode(errors="replace").splitlines()
@@ -154,14 +146,15 @@ def _function(block: bytes) -> Function:
     except ValueError as error:
         problem = str(error) if "export" in str(error) else "a set 58 has a damaged header or value"
         raise ValueError(f"{problem.partition('; ')[0]}; export it again as text") from None
-    parts = 1 + (form in COMPLEX) + (not is_even)
+    is_complex = form in (5, 6)  # types of values
+    parts = 1 + is_complex + (not is_even)
     values = values[: len(values) // parts * parts].reshape(-1, parts)
     is_text = "b" not in lines[1].lower()  # line ends may follow binary values
     row = 6  # values of a line of text, which may be filled up
     if count < 2 or len(values) < count or (is_text and len(values) > count + row):
         raise ValueError(f"a set 58 has {len(values)} of {count} values; export it again")
     x = start + step * np.arange(count) if is_even else values[:count, 0]
-    y = values[:count, -1] if form not in COMPLEX else values[:count, -2:] @ np.array([1, 1j])
+    y = values[:count, -2:] @ np.array([1, 1j]) if is_complex else values[:count, -1]
     time, frequency = 17, 18  # types of abscissas
     is_in_time = abscissa == time if abscissa in (time, frequency) else kind == IN_TIME
     dimension = "time" if is_in_time else "frequency"
@@ -177,7 +170,8 @@ def _function(block: bytes) -> Function:
         quantity=quantities.get(ordinate, "") or units.quantity_of(bare),
         names=(at_by[4], "" if ids[0].upper() == "NONE" else ids[0]),
         at=(ends[0], ends[1]), by=(ends[2], ends[3]) if kind == RESPONSE else (0, 0),
-        is_in_time=is_in_time, is_reference=any(REFERENCE.match(text) for text in ids[:2]),
+        is_in_time=is_in_time,
+        is_reference=any(re.match(r"ref(erence)?\d*\b", x, re.IGNORECASE) for x in ids[:2]),
         is_other=ordinate not in (0, 1, *quantities), y=y,
         x=units.in_si(x, units.divisor(axis, dimension) if axis else 1.0),
     )  # fmt: skip
@@ -196,9 +190,11 @@ def _numbers(body: bytes, form: int, coding: list[str]) -> Floats:
 
 
 def _text_numbers(body: bytes) -> Floats:
-    """Return the numbers in a text, those of Fortran, too."""
-    texts = (found.decode().upper().replace("D", "E") for found in NUMBER.findall(body))
-    return np.array([float(SHORT.sub(r"\1E\2", text)) for text in texts])
+    """Return the numbers in a text, also "1.5-100" of Fortran."""
+    number = rb"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[ED][-+]?\d+|[-+]\d{3}(?![\d.]))?|nan|inf)"
+    texts = re.findall(number, body.replace(b"d", b"D").replace(b"D", b"E"), re.IGNORECASE)
+    short = re.compile(r"(\d)([-+]\d{3})$")
+    return np.array([float(short.sub(r"\1E\2", text.decode())) for text in texts])
 
 
 def _motion(functions: list[Function], given: Given) -> tuple[list[Function], list[Function]]:

@@ -20,8 +20,8 @@ from skinwave.bodies.parts import solid_of
 from skinwave.bodies.sheet import refuse_unheld_air
 from skinwave.bodies.supports import FRAME
 from skinwave.models.laws import check_laws
-from skinwave.scene import keys as scene_keys
-from skinwave.scene.keys import MATERIAL, MODULI, PRONY, SCALES
+from skinwave.scene.dotted_keys import with_value
+from skinwave.scene.keys import SCALES, SECTIONS, TABLES, write_material
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -128,7 +128,7 @@ def meshing_shares(keys: Sequence[FreeKey]) -> tuple[float, ...]:
     and the fastest shear waves below all layers, where an absorbing layer is widest. Layers with
     equal ranges get different shares, so that they are not merged.
     """
-    fastest = {"shear_modulus_pa": 1.0, MODULI: 1.0, "density_kg_m3": 0.0}
+    fastest = {"shear_modulus_pa": 1.0, "modulus_scale": 1.0, "density_kg_m3": 0.0}
     inside = [0.4 + 0.2 * k / len(keys) for k in range(len(keys))]
     return tuple(
         1.0 if key.is_thickness else fastest.get(key.path[0], x) if key.part is None else x
@@ -154,9 +154,11 @@ def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
             "losses, times or densities, or reduce a body for each value"
         )
     if path != THICKNESS:
-        known = [*(name for name in MATERIAL if name not in fixed), *SCALES]
+        known = [*(name for name in TABLES["body.material"] if name not in fixed), *SCALES]
         choose(f"free key '{key}'", path[0], known)
-    if path[0] == "prony" and not (len(path) == 3 and path[1].isdecimal() and path[2] in PRONY):
+    if path[0] == "prony" and not (
+        len(path) == 3 and path[1].isdecimal() and path[2] in TABLES["body.material.prony"]
+    ):
         raise ValueError(f"'{key}' is not a number of a Prony term; use, e.g., prony.0.modulus_pa")
     low, high = (float(bound) for bound in bounds)
     if not (isfinite(low) and isfinite(high) and low < high):
@@ -238,12 +240,12 @@ def _with_numbers(
     solid: Material, keys: Sequence[FreeKey], values: Mapping[str, float]
 ) -> Material:
     """Return the material with other numbers, then scaled."""
-    table = scene_keys.write_material(solid)
+    table = write_material(solid)
     for key in keys:
         if not key.is_scale:
-            table = scene_keys.with_value(table, key.path, _value(key, values))
+            table = with_value(table, key.path, _value(key, values))
     if not all(key.is_scale for key in keys):
-        solid = scene_keys.SECTIONS["body"]["material"].read("material", table)
+        solid = SECTIONS["body"]["material"].read("material", table)
     factors = {SCALES[key.path[0]]: _value(key, values) for key in keys if key.is_scale}
     return solid.scaled(**factors) if factors else solid
 

@@ -26,8 +26,6 @@ from skinwave.scene.scene import Scene
 from skinwave.system.formats import PATTERN_READERS, register
 from skinwave.typing import Floats
 
-ENDLESS = 1.0  # s, duration of a pattern without an end
-
 
 def read(content: bytes, options: Options, base: Scene) -> Pattern:
     """Read the pattern of an .adaptics file; if it jumps back endlessly, only its loop."""
@@ -37,8 +35,9 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
     before = float(np.diff(animation.runs[: animation.loop or 0]).sum())  # s until the loop
     duration = float(np.diff(runs).sum())
     if duration == 0:
-        runs, duration = runs[-1:] + [[0.0, ENDLESS]], ENDLESS
-        notes.append(f"the pattern has no end; it is cut at {ENDLESS:g} s")
+        duration = 1.0
+        runs = runs[-1:] + [[0.0, duration]]
+        notes.append(f"the pattern has no end; it is cut at {duration:g} s")
     if not 2 / ENGINE_RATE <= duration <= LONGEST:
         raise ValueError(
             f"the pattern lasts {duration:g} s; move its keyframes or its jump so that it lasts "
@@ -91,9 +90,8 @@ def _loops(brushes: list[Brush], period: float, notes: list[str]) -> int:
     )
     many = np.outer(np.arange(1, int(LONGEST / period) + 1), cycles)
     jump = np.abs(many - np.round(many)).max(axis=1)
-    count = int(
-        np.argmax(jump <= RETURN_TOLERANCE) if (jump <= RETURN_TOLERANCE).any() else np.argmin(jump)
-    )
+    returns = jump <= RETURN_TOLERANCE
+    count = int(np.argmax(returns) if returns.any() else np.argmin(jump))
     if jump[count] > COMMENSURATE:
         notes.append(
             f"the path repeats after {count + 1} loops, where the brush jumps by "

@@ -16,14 +16,11 @@ from skinwave.system.json_kinds import is_finite_number
 FORMAT = "MidAirHapticsAnimationFileFormat"
 REVISIONS = ("0.0.10-alpha.1", "0.1.0-alpha.2", "0.1.0-alpha.3")
 DRAWING_FREQUENCY = 100.0  # Hz, of a brush without one
-KEYFRAMES = ("standard", "pause", "stop")
 BRUSHES = {
     "circle": ("radius",),
     "line": ("length", "rotation"),
     "lissajous": ("x_scale", "y_scale", "a", "b", "d", "rotation"),
 }
-ARITHMETIC = {"add": add, "subtract": sub, "multiply": mul, "divide": truediv}
-OPERATORS = {"lt": lt, "lt_eq": le, "gt": gt, "gt_eq": ge}
 Table = Mapping[str, Any]  # a JSON object
 Entry = tuple[float, Any, bool]  # of a track: time in s, value, whether it stays until the next
 
@@ -36,9 +33,6 @@ class Brush:
     numbers: tuple[float, ...]
     am_frequency: float
     drawing_frequency: float
-
-
-POINT = Brush(name="circle", numbers=(0.0,), am_frequency=0.0, drawing_frequency=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +104,8 @@ class _Numbers:
         """Whether the condition of a jump is met; never for a parameter without a value."""
         operator, parameter = condition.get("operator"), condition.get("parameter")
         word = operator.get("name") if isinstance(operator, dict) else operator
-        compare = OPERATORS[choose("operator of a jump", str(word)[:40], OPERATORS)]
+        operators = {"lt": lt, "lt_eq": le, "gt": gt, "gt_eq": ge}
+        compare = operators[choose("operator of a jump", str(word)[:40], operators)]
         limit = _finite(condition.get("value"), "value of a jump's condition")
         if not isinstance(parameter, str) or parameter not in {**self._definitions, **self._given}:
             return False
@@ -150,10 +145,11 @@ class _Numbers:
             return self._parameter(value)
         if kind == "negate":
             return -self._formula(value, name)
-        if kind not in ARITHMETIC or not isinstance(value, list) or len(value) != 2:
+        arithmetic = {"add": add, "subtract": sub, "multiply": mul, "divide": truediv}
+        if kind not in arithmetic or not isinstance(value, list) or len(value) != 2:
             raise ValueError(f"the formula of {name} has the unknown type '{kind[:40]}'")
         try:
-            return float(ARITHMETIC[kind](*(self._formula(part, name) for part in value)))
+            return float(arithmetic[kind](*(self._formula(part, name) for part in value)))
         except ZeroDivisionError:
             raise ValueError(f"{name} divides by 0; change the value of the parameter") from None
 
@@ -167,7 +163,9 @@ def _animation(table: Table, number: _Numbers) -> Animation:
     jumps: list[tuple[float, float]] = []  # time of a jump, and its target
     kinds: dict[float, str] = {}  # of the last keyframe at a time
     for time, frame in _keyframes(table, speed):
-        kind = choose("type of a keyframe", str(frame.get("type"))[:40], KEYFRAMES)
+        kind = choose(
+            "type of a keyframe", str(frame.get("type"))[:40], ("standard", "pause", "stop")
+        )
         kinds[time] = kind
         for key, track in tracks.items():
             is_set = kind != "stop" and frame.get(key) is not None
@@ -184,11 +182,12 @@ def _animation(table: Table, number: _Numbers) -> Animation:
     geometry = _child(transform, "geometric_transforms", dict, {})
     factor = number(transform.get("intensity_factor", 1.0), "intensity_factor")
     number.check_parameters()
+    point = Brush(name="circle", numbers=(0.0,), am_frequency=0.0, drawing_frequency=0.0)
     notes = list(number.notes.values())
     if speed != 1:
         notes.append(f"playback at {speed:g} times the speed; drawing frequencies do not change")
     return Animation(
-        name=str(table.get("name", ""))[:80], brushes=_track(tracks["brush"], POINT),
+        name=str(table.get("name", ""))[:80], brushes=_track(tracks["brush"], point),
         places=replace(places, values=_transform(places.values, geometry, number)),
         intensities=_track(tracks["intensity"], 0.0), factor=factor, runs=runs, loop=loop,
         notes=tuple(notes),
@@ -200,13 +199,9 @@ def _keyframes(table: Table, speed: float) -> list[tuple[float, Table]]:
     keyframes = _child(table, "keyframes", list)
     if not keyframes:
         raise ValueError("the file has no keyframes; add at least one")
-    found = [
-        (
-            _finite(_check(each, "a keyframe").get("time"), "time of a keyframe") / 1e3 / speed,
-            each,
-        )
-        for each in keyframes
-    ]
+    times = [_finite(_check(each, "a keyframe").get("time"), "time of a keyframe")
+             for each in keyframes]  # fmt: skip
+    found = [(time / 1e3 / speed, each) for time, each in zip(times, keyframes, strict=True)]
     found.sort(key=lambda pair: pair[0])
     if found[0][0] < 0:
         raise ValueError(f"a keyframe is at {1e3 * found[0][0]:g} ms; move it to 0 ms or later")

@@ -13,10 +13,6 @@ from skinwave.scene.scene import Scene
 from skinwave.system.formats import PATTERN_WRITERS, register
 from skinwave.typing import Floats
 
-MOST_KEYFRAMES = 20_000
-ASIDE = 1e-9  # of a period: keyframes on both sides of a corner keep jumps sharp
-LINEAR = {"name": "linear", "params": {}}
-
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     """Return the .adaptics file of a scene's Tacton, in the newest revision, and notes."""
@@ -80,20 +76,21 @@ def _check(scene: Scene) -> None:
             )
 
 
-def _path(scene: Scene) -> tuple[Floats, Floats, Floats]:
+def _path(scene: Scene, most_keyframes: int = 20_000) -> tuple[Floats, Floats, Floats]:
     """Return times (k,) in s, places (k, 2) in m and levels (k,) of the keyframes of a path."""
     path, end = scene.tacton.trajectory, scene.tacton.duration
     f_d, ahead = path.drawing_frequency, scene.tacton.foci[0]
     corners = np.add.outer(np.arange(int(end * f_d) + 3) - 1, path.parts[0]).ravel() - ahead
-    sides = np.concatenate([corners - ASIDE, corners + ASIDE]) / f_d
+    aside = 1e-9  # of a period: keyframes on both sides of a corner keep jumps sharp
+    sides = np.concatenate([corners - aside, corners + aside]) / f_d
     times = np.union1d(np.linspace(0.0, end, round(end * ENGINE_RATE) + 1), sides)
     times = times[(times >= 0) & (times <= end)]
     phases = np.mod(f_d * times + ahead, 1.0)
     places, levels = path.at_phase(phases), np.sqrt(scene.pressure.weight(phases))
     kept = thin(times, places, levels)
-    if len(kept) > MOST_KEYFRAMES:
+    if len(kept) > most_keyframes:
         raise ValueError(
-            f"the path of {end:g} s needs {len(kept):,} keyframes, more than {MOST_KEYFRAMES:,}; "
+            f"the path of {end:g} s needs {len(kept):,} keyframes, more than {most_keyframes:,}; "
             "shorten the Tacton, or write .csv"
         )
     return times[kept], places[kept], levels[kept]
@@ -119,13 +116,14 @@ def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
 
 def _keyframe(t: float, place: Any, level: float, brush: dict[str, Any]) -> dict[str, Any]:
     x, y = (1e3 * float(each) for each in place)
-    constant = {"name": "constant", "params": {"value": _f64(level)}}
-    return {
-        "type": "standard", "time": 1e3 * float(t), "cjumps": [],
-        "brush": {"brush": brush, "transition": LINEAR},
-        "intensity": {"intensity": constant, "transition": LINEAR},
-        "coords": {"coords": {"x": x, "y": y, "z": 0.0}, "transition": LINEAR},
+    settings = {
+        "brush": brush, "coords": {"x": x, "y": y, "z": 0.0},
+        "intensity": {"name": "constant", "params": {"value": _f64(level)}},
     }  # fmt: skip
+    linear = {"name": "linear", "params": {}}
+    return {"type": "standard", "time": 1e3 * float(t), "cjumps": []} | {
+        key: {key: value, "transition": linear} for key, value in settings.items()
+    }
 
 
 def _figure(name: str, numbers: dict[str, float], tacton: Tacton, f_d: float) -> dict[str, Any]:

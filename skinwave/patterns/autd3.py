@@ -17,16 +17,9 @@ from skinwave.system.formats import PATTERN_WRITERS, register
 from skinwave.typing import Floats
 
 TICK = 40_000.0  # Hz
-MOST_PATTERNS = 8192  # of a FociSTM
-MOST_SAMPLES = 32_768  # of a modulation
-MOST_DIVISION = 65_535
-SLOWEST = MOST_PATTERNS * MOST_DIVISION  # ticks of a period
-MODULATION = 10  # ticks a sample: 4 kHz
-RESOLUTION = 0.025  # mm, of positions in devices
-
-
-PYAUTD3 = (
-    """
+PACKAGES = {  # imports and body of the script
+    "pyautd3": (
+        """
 # Replace Nop by the link of your devices.
 
 import time
@@ -37,7 +30,7 @@ from pyautd3 import SamplingConfig, Silencer
 from pyautd3.link.nop import Nop
 from pyautd3.modulation import Custom
 """,
-    """
+        """
 with Controller.open([AUTD3(pos=[0.0, 0.0, 0.0], rot=[1, 0, 0, 0])], Nop()) as autd:
     centre = autd.center()
     foci = [
@@ -50,9 +43,9 @@ with Controller.open([AUTD3(pos=[0.0, 0.0, 0.0], rot=[1, 0, 0, 0])], Nop()) as a
     time.sleep(DURATION)
     autd.send(Null())
 """,
-)
-AUTD3 = (
-    """
+    ),
+    "autd3": (
+        """
 # Replace emulator.option() by UdpOption() for devices; pip install autd3 autd3-modulation.
 
 import asyncio
@@ -64,7 +57,7 @@ from autd3.geometry import Autd3, Geometry
 from autd3.value import ControlPoint, ControlPoints, SamplingConfig
 from autd3_modulation import ModulationBuffer
 """,
-    """
+        """
 
 def commands(geometry):
     centre = geometry.center()
@@ -89,8 +82,8 @@ async def play():
 if __name__ == "__main__":
     asyncio.run(play())
 """,
-)
-PACKAGES = {"pyautd3": PYAUTD3, "autd3": AUTD3}
+    ),
+}
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
@@ -109,7 +102,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
         f"{count} patterns of {places.shape[1]} foci, one every {division} ticks of 40 kHz, each "
         f"focus up to {apart:.3g} mm from its last place",
         f"drawing frequency {drawn:.6g} Hz in place of {path.drawing_frequency:.6g} Hz",
-        f"the device rounds positions to {RESOLUTION:g} mm",
+        "the device rounds positions to 0.025 mm",
     ]
     if foci > 1:
         notes.append(f"{foci} foci {'in turn' if in_turn else 'at the same time'}")
@@ -139,21 +132,23 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     return "\n".join([*script, ""]).encode(), tuple(notes)
 
 
-def steps(frequency: float, multiple: int = 1) -> tuple[int, int]:
-    """Return points per period, a multiple of `multiple`, and ticks per point for the frequency
-    nearest to a drawing frequency in Hz; for a focus at rest two points, the minimum of a FociSTM.
+def steps(
+    frequency: float, multiple: int = 1, most_points: int = 8192, most_ticks: int = 65_535
+) -> tuple[int, int]:
+    """Return points per period, a multiple of `multiple`, and ticks per point.
 
-    Raises a ValueError if the frequency is too low for a device.
+    They give the frequency nearest to a drawing frequency in Hz. A focus at rest has two points,
+    the minimum of a FociSTM. Raises a ValueError if the frequency is too low for a device.
     """
     if frequency == 0:
         return 2 * multiple, 1
     ticks = TICK / frequency
-    most = MOST_PATTERNS // multiple * multiple
+    most = most_points // multiple * multiple
     division = max(1, ceil(ticks / most - 1e-9))
-    if division > MOST_DIVISION:
+    if division > most_ticks:
         raise ValueError(
-            f"the drawing frequency of {frequency:g} Hz is below the {TICK / SLOWEST:.2g} Hz of a "
-            "device; raise the speed"
+            f"the drawing frequency of {frequency:g} Hz is below the "
+            f"{TICK / most_points / most_ticks:.2g} Hz of a device; raise the speed"
         )
     count = max(multiple, round(ticks / division / multiple) * multiple)
     return min(count, most), division
@@ -171,7 +166,8 @@ def _places(pressure: MovingPressure, count: int, *, in_turn: bool) -> Floats:
 def _modulation(pressure: MovingPressure, f_d: float) -> tuple[np.ndarray, int]:
     """Return the sound pressure as bytes (k,), one if it is constant, and ticks per sample."""
     tacton, path = pressure.tacton, pressure.tacton.trajectory
-    ticks = max(MODULATION, ceil(tacton.duration * TICK / MOST_SAMPLES))
+    least_ticks, most_samples = 10, 32_768  # 4 kHz
+    ticks = max(least_ticks, ceil(tacton.duration * TICK / most_samples))
     t = np.arange(max(2, int(tacton.duration * TICK / ticks))) * (ticks / TICK)
     loud = loudness(pressure, t)
     if path.levels:

@@ -31,7 +31,6 @@ NAMES = {role: role for role in COLUMNS.values()} | {
     "t": "time", "timestamp": "time", "focus": "point", "id": "point", "index": "point",
     "amplitude": "intensity", "strength": "intensity",
 }  # fmt: skip
-DEVICE_RATE = 40_000.0  # Hz
 
 
 def read(content: bytes, options: Options, base: Scene) -> Pattern:
@@ -113,9 +112,10 @@ def tacton_of(times: Floats, places: Floats, levels: Floats, *, hold: bool = Fal
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     """Return a tidy CSV of a scene's foci at a rate, and notes."""
-    rate = DEVICE_RATE if options.rate is None else options.rate
-    if not (isfinite(rate) and 1 <= rate <= DEVICE_RATE):
-        raise ValueError(f"--rate is {rate:g} Hz; devices take 1 to {DEVICE_RATE:g} Hz")
+    fastest = 40_000.0  # Hz, of devices
+    rate = fastest if options.rate is None else options.rate
+    if not (isfinite(rate) and 1 <= rate <= fastest):
+        raise ValueError(f"--rate is {rate:g} Hz; devices take 1 to {fastest:g} Hz")
     tacton, path = scene.tacton, scene.tacton.trajectory
     t = np.arange(max(2, round(tacton.duration * rate))) / rate
     amplitude = loudness(scene.pressure, t)

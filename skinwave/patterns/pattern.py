@@ -15,7 +15,6 @@ from skinwave.typing import Floats
 
 ENGINE_RATE = 20_000.0  # Hz, of samples in AdapTics
 STRAIGHT = 2e-5, 1e-3  # m and of full drive, tolerances of straight lines between samples
-MARGIN = 0.010  # m between a path and the edge of a body that is made for it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +78,8 @@ def resize(tacton: Tacton, factor: float) -> Tacton:
 
 def wide_enough(base: Scene, tacton: Tacton, notes: list[str]) -> Scene:
     """Widen the body of the base scene if the path of a Tacton needs it, and add a note."""
-    reach = 2 * (np.abs(tacton.trajectory.outline).max(axis=0) + MARGIN)
+    margin = 0.010  # m between path and edge
+    reach = 2 * (np.abs(tacton.trajectory.outline).max(axis=0) + margin)
     width, height = np.maximum(reach, [base.body.width, base.body.height]).tolist()
     if (width, height) == (base.body.width, base.body.height):
         return base

@@ -17,18 +17,12 @@ from skinwave.scene.scene import Scene
 from skinwave.system.formats import PATTERN_READERS, register
 from skinwave.typing import Floats
 
-SCALES = ("full", "peak", "rms")
-CLIPPED = 0.02  # beyond full drive that is clipped: the rounding of a sine with 8 bits
-LEAST_PEAK = 1e-12  # of full scale, and its inverse: other peaks are damaged numbers
-RESOLUTION = 2.0**-15  # of full scale, that of 16 bits: an envelope may be below 0 by rounding
-
 
 def read(content: bytes, options: Options, base: Scene) -> Pattern:
     """Read a WAV as the envelope of the base scene's Tacton, replacing its rhythm, or as its
     modulation, replacing its sinusoids. The Tacton lasts as long as the WAV.
     """
     choose("role of a WAV", options.role, ROLES)
-    choose("scale", options.scale, SCALES)
     rate, channels, _ = decode(content)
     if channels.shape[1] != 1:
         raise ValueError(f"the WAV has {channels.shape[1]} channels; mix it down to one")
@@ -37,7 +31,8 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
         raise ValueError("the WAV has samples that are not finite; export it again")
     samples, note = _scale(samples, options.scale)
     if options.role == "envelope":
-        if samples.min() < -RESOLUTION:
+        rounding = 2.0**-15  # of full scale, that of 16 bits
+        if samples.min() < -rounding:
             raise ValueError(
                 f"an envelope must not be negative, but falls to {samples.min():.3g}; use the role "
                 "modulation"
@@ -83,14 +78,15 @@ def _scale(samples: Floats, scale: str) -> tuple[Floats, str]:
     peak = float(np.abs(samples).max())
     if peak == 0:
         raise ValueError("the WAV is silent; export it again")
-    if not LEAST_PEAK < peak < 1 / LEAST_PEAK:
+    if not 1e-12 < peak < 1e12:  # other numbers are damaged
         raise ValueError(
             f"the WAV has a peak of {peak:.3g} of full scale, which no recording has; export it "
             "again with a peak of 1"
         )
     rms = float(np.sqrt(np.mean(samples**2)))
-    factor = {"full": 1.0, "peak": 1 / peak, "rms": np.sqrt(0.5) / rms}[scale]
-    if factor * peak > 1 + CLIPPED:
+    factors = {"full": 1.0, "peak": 1 / peak, "rms": np.sqrt(0.5) / rms}
+    factor, clipped = factors[choose("scale", scale, factors)], 0.02  # a sine of 8 bits is rounded
+    if factor * peak > 1 + clipped:
         raise ValueError(
             f"with scale '{scale}' the WAV reaches {factor * peak:.3g} times full drive; use the "
             "scale 'peak'"

@@ -21,9 +21,7 @@ from simple_model.choices import choose, suggestion
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
-VALUE, SHAPE = "value", "distribution"  # keys of the table, in addition to its width
-TAIL = 1.6448536269514722  # standard deviations from the median of a normal to its 95th percentile
-EDGE = 1e-9  # distance of shares from 0 and 1, which keeps quantiles finite
+VALUE = "value"  # key of the central value in the table of a number
 # Keys in a scene file and possible shapes, the default first, of each measure of the width.
 MEASURES = {
     "spread": (("spread",), ("lognormal", "normal")),
@@ -31,7 +29,6 @@ MEASURES = {
     "standard_error": (("standard_error",), ("normal", "lognormal")),
     "bounds": (("low", "high"), ("uniform", "triangular")),
 }
-PARTS = {"body": "material", "focus": "device", "tacton": "device"}  # by section of a key
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +55,7 @@ class Distribution:
         choose("measure", self.measure, MEASURES)
         if self.shape not in (fits := MEASURES[self.measure][1]):
             raise ValueError(
-                f"a {self.shape} {SHAPE} cannot be given by {self.measure}; use "
+                f"a {self.shape} distribution cannot be given by {self.measure}; use "
                 f"{' or '.join(fits)}, or another measure of its width"
             )
         if not all(map(isfinite, self.width)):
@@ -83,7 +80,8 @@ class Distribution:
     def quantile(self, value: float, shares: ArrayLike) -> Floats:
         """Return the quantiles (...) about a central value, at shares (...) from 0 to 1."""
         self.check(value)
-        shares = np.clip(np.asarray(shares, np.float64), EDGE, 1 - EDGE)
+        edge = 1e-9  # distance of shares from 0 and 1, which keeps quantiles finite
+        shares = np.clip(np.asarray(shares, np.float64), edge, 1 - edge)
         if self.measure == "bounds":
             low, high = self.width
             if self.shape == "uniform":
@@ -96,7 +94,9 @@ class Distribution:
             deviation = width if self.measure == "standard_error" else width * abs(value)
             return np.asarray(value + deviation * ndtri(shares))
         c = width / value if self.measure == "standard_error" else width
-        s = log(width) / TAIL if self.measure == "factor" else sqrt(log1p(c**2))
+        s = sqrt(log1p(c**2))
+        if self.measure == "factor":
+            s = log(width) / float(ndtri(0.95))
         return np.asarray(value * np.exp(s * ndtri(shares)))
 
     def check(self, value: float) -> None:
@@ -140,7 +140,8 @@ class Spread:
     @property
     def part(self) -> str:
         """The source of uncertainty that it belongs to: material, device or placement."""
-        return PARTS.get(self.key.partition(".")[0], "placement")
+        parts = {"body": "material", "focus": "device", "tacton": "device"}
+        return parts.get(self.key.partition(".")[0], "placement")
 
     def at(self, shares: ArrayLike) -> list[float]:
         """Return the quantiles at shares (n,) from 0 to 1."""
@@ -160,7 +161,7 @@ def uniform(key: str, low: float, high: float) -> Spread:
 
 def read_distribution(key: str, table: Mapping[str, Any]) -> Distribution:
     """Return the distribution in the table of a `value` and its spread."""
-    known = (VALUE, SHAPE, *(k for keys, _ in MEASURES.values() for k in keys))
+    known = (VALUE, "distribution", *(k for keys, _ in MEASURES.values() for k in keys))
     for own in table:
         if own not in known:
             hint = suggestion(own, known) or f"; use one of {', '.join(known)}"
@@ -179,7 +180,7 @@ def read_distribution(key: str, table: Mapping[str, Any]) -> Distribution:
         default = "normal"
     try:
         distribution = Distribution(
-            shape=table.get(SHAPE, default),
+            shape=table.get("distribution", default),
             measure=given[0],
             width=tuple(float(table[k]) for k in keys),
         )
@@ -192,7 +193,7 @@ def read_distribution(key: str, table: Mapping[str, Any]) -> Distribution:
 def distribution_table(value: Any, given: Distribution) -> dict[str, Any]:
     """Return the table of a value and its distribution for a scene file."""
     keys, _ = MEASURES[given.measure]
-    return {VALUE: value, SHAPE: given.shape, **dict(zip(keys, given.width, strict=True))}
+    return {VALUE: value, "distribution": given.shape, **dict(zip(keys, given.width, strict=True))}
 
 
 # Distributions on the command line: shape, measure, and an example with all numbers.
@@ -203,7 +204,6 @@ CALLS = {
     "uniform": ("uniform", "bounds", "uniform(10, 20)"),
     "triangular": ("triangular", "bounds", "triangular(10, 15, 20)"),
 }
-CALL = re.compile(rf"\s*({'|'.join(CALLS)})\s*\(([^()]*)\)\s*")
 
 
 def parse_distribution(key: str, text: str) -> Spread | None:
@@ -211,7 +211,7 @@ def parse_distribution(key: str, text: str) -> Spread | None:
 
     The central value comes first, or is the middle of the limits.
     """
-    match = CALL.fullmatch(text)
+    match = re.fullmatch(rf"\s*({'|'.join(CALLS)})\s*\(([^()]*)\)\s*", text)
     if match is None:
         return None
     shape, measure, example = CALLS[match[1]]

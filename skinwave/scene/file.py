@@ -3,7 +3,7 @@
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -23,24 +23,13 @@ from skinwave.scene.distributions import (
     distribution_table,
     read_distribution,
 )
+from skinwave.scene.dotted_keys import value_at, with_value
 from skinwave.scene.focus_file import with_spot
-from skinwave.scene.keys import (
-    DERIVED,
-    PATH,
-    SECTIONS,
-    as_table,
-    as_text,
-    read_keys,
-    value_at,
-    with_value,
-)
+from skinwave.scene.keys import DERIVED, SECTIONS, as_table, as_text, read_keys
 from skinwave.scene.load import Load
 from skinwave.scene.material_file import with_tables
 from skinwave.scene.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
 
-PAIRS = re.compile(r"\[\s+(-?\d[\d.e+-]*),\s+(-?\d[\d.e+-]*),\s+\]")  # each number on its own line
-SCENE = "a scene, which is TOML text of keys such as size_mm = 20 below a header such as [tacton]"
-CURE = "write key = value, with each key once, texts in quotes, and numbers such as 0.5"
 DEEPEST = 100  # parts of a key, or tables in each other; those of a scene have at most seven
 TOO_DEEP = (
     "keys or brackets are nested too deeply; write keys such as thickness_mm = 10 below a header "
@@ -59,7 +48,8 @@ def read(path: str | Path) -> Scene:
     >>> read("scene.toml").tacton.am_frequency
     140.0
     """
-    text = reading.read_text(path, must=SCENE)
+    must = "a scene, TOML text of keys such as size_mm = 20 below a header such as [tacton]"
+    text = reading.read_text(path, must=must)
     try:
         return from_table({"name": Path(path).stem} | parse_toml(text, Path(path).parent))
     except ValueError as error:
@@ -82,7 +72,8 @@ def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
     and the files of body and focus get their full path.
     """
     # The time of the parser is quadratic in the parts of a key.
-    if max(map(_parts, re.split(r"[\n#={,]", text))) > DEEPEST:
+    keys = re.split(r"[\n#={,]", text)
+    if max(sum(1 for part in key.split(".") if part.strip()) for key in keys) > DEEPEST:
         raise ValueError(TOO_DEEP)
     try:
         table = tomllib.loads(text)
@@ -99,11 +90,6 @@ def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
     return with_tables(table, folder)
 
 
-def _parts(text: str) -> int:
-    """Number of parts of a dotted key, without empty ones, which a line of dots has."""
-    return sum(1 for part in text.split(".") if part.strip())
-
-
 def _not_toml(text: str, error: str) -> str:
     """Error of the parser in plain words, with the line and the cure."""
     lines = text.splitlines() or [""]
@@ -112,7 +98,8 @@ def _not_toml(text: str, error: str) -> str:
     if "Illegal character '\\n'" in error and k > 1:  # reported at the start of the next line
         k -= not lines[k - 1].count('"') % 2
     line = lines[k - 1].strip()
-    cure = PATHS if "\\" in line else CURE
+    cure = "write key = value, with each key once, texts in quotes, and numbers such as 0.5"
+    cure = PATHS if "\\" in line else cure
     return f"not valid TOML: line {k} is {line[:60]}; {cure}"
 
 
@@ -146,7 +133,7 @@ def from_table(table: dict[str, Any]) -> Scene:
     load = Load(**parts["load"])
     if parts["focus"] and not load.of_kind.is_of_device:
         raise ValueError(f"[focus] does not apply to a load of kind '{load.kind}'; remove it")
-    tacton, path = _split(parts["tacton"], PATH)
+    tacton, path = _split(parts["tacton"], tuple(field.name for field in fields(Trajectory)))
     pressure = MovingPressure(
         tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **with_spot(parts["focus"])
     )
@@ -199,7 +186,8 @@ def dumps(scene: Scene) -> str:
     >>> loads(dumps(loads(""))) == loads("")
     True
     """
-    return PAIRS.sub(r"[\1, \2]", tomli_w.dumps(to_table(scene)))
+    pairs = r"\[\s+(-?\d[\d.e+-]*),\s+(-?\d[\d.e+-]*),\s+\]"  # each number on its own line
+    return re.sub(pairs, r"[\1, \2]", tomli_w.dumps(to_table(scene)))
 
 
 def to_table(scene: Scene) -> dict[str, Any]:

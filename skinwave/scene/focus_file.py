@@ -27,16 +27,14 @@ from skinwave.system.headings import Column, parse_heading
 from skinwave.system.text_table import parse_table
 from skinwave.typing import Floats
 
-SOUND, LEVEL = "sound pressure", "sound pressure level"
-INTENSITY, RADIATION = "intensity", "radiation pressure"
 NAMES = {axis: axis for axis in "xyz"} | {
     name: kind
     for kind, names in {
-        SOUND: ("pressure", "sound pressure", "acoustic pressure", "total acoustic pressure",
-                "level"),
-        LEVEL: ("spl", "lp", "sound pressure level"),
-        INTENSITY: ("i", "intensity", "sound intensity", "acoustic intensity"),
-        RADIATION: ("radiation pressure", "acoustic radiation pressure", "arp"),
+        "radiation pressure": ("radiation pressure", "acoustic radiation pressure", "arp"),
+        "intensity": ("i", "intensity", "sound intensity", "acoustic intensity"),
+        "sound pressure": ("pressure", "sound pressure", "acoustic pressure",
+                           "total acoustic pressure", "level"),
+        "sound pressure level": ("spl", "lp", "sound pressure level"),
     }.items()
     for name in names
 }  # fmt: skip
@@ -172,8 +170,8 @@ def _spot(columns: Columns, file: str, unit: str, needs_peak: bool) -> SpotMap:
     for z in (values.real for column, values in columns if column.role == "z"):
         if np.ptp(z) > 1e-6 * np.abs(z).max():
             raise ValueError("the map has several values of z; give the plane through the focus")
-    known = {column.role for column, _ in columns}
-    kind = next((k for k in (RADIATION, INTENSITY, SOUND, LEVEL) if k in known), "")
+    known = {column.role for column, _ in columns} - {*"xyz"}
+    kind = next((kind for kind in NAMES.values() if kind in known), "")
     if not kind:
         raise ValueError(f"no column has a known name; {MUST}")
     values, per_value, source = _pressures(columns, kind)
@@ -221,17 +219,17 @@ def _pressures(columns: Columns, kind: str) -> tuple[Floats, float, str]:
     first = parts[0][0]
     stored = parts[0][1] + (1j * parts[1][1] if is_split else 0.0)
     is_complex, values = bool(is_split or np.imag(stored).any()), np.real(stored)
-    unit, dimension = first.unit, "intensity" if kind == INTENSITY else "pressure"
+    unit, dimension = first.unit, "intensity" if kind == "intensity" else "pressure"
     is_absolute = units.dimension_of(unit) == dimension
     scale = 1 / units.divisor(unit, dimension) if is_absolute else 0.0
-    if kind == LEVEL or unit.lower().startswith("db"):
+    if kind == "sound pressure level" or unit.lower().startswith("db"):
         reference = 20e-6  # Pa, RMS
-        per_value = 2 * reference**2 * (kind == LEVEL and values.max() > 0)
+        per_value = 2 * reference**2 * (kind == "sound pressure level" and values.max() > 0)
         per_value *= 10 ** (values.max() / 10) / (AIR_DENSITY * SPEED_OF_SOUND**2)
         return 10 ** ((values - values.max()) / 10), per_value, f"{kind} in dB"
-    if kind == RADIATION:
+    if kind == "radiation pressure":
         return values, scale, kind
-    if kind == INTENSITY:
+    if kind == "intensity":
         return values, 2 * scale / SPEED_OF_SOUND, kind
     if not is_complex and values.min() < 0:
         raise ValueError(

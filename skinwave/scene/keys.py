@@ -1,17 +1,12 @@
-"""Keys of a scene file, each with its unit, its values and its attribute.
+"""Keys of a scene file, each with its unit, its values and its attribute."""
 
-The module also reads and changes dotted keys in the table of a scene.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from math import inf, isfinite, nextafter, pi
 from typing import Any
 
 from simple_model import DRIVES, DriveLaw, Material, ModulusTable, PronyTerm, Rhythm, Signal
 from simple_model.choices import choose
-from simple_model.layers.material import PRESETS
 from simple_model.layers.modulus_laws import COLUMNS
 from simple_model.load.focus import FOCI, FocalSpot
 from simple_model.load.spot_map import SpotMap
@@ -19,13 +14,8 @@ from simple_model.load.trajectory import Points
 from skinwave.scene.key_hints import key_hint
 from skinwave.scene.load import SupportMotion
 from skinwave.scene.material_file import material_of, modulus_columns, values_of
-from skinwave.scene.scene import Layer, Mounting, Phalanx, Relief, Sides, solid_of
-from skinwave.system.plain_text import number_in
-
-# Typical depths in m of receptors in the glabrous skin of a hand: Merkel cells at the base of
-# the epidermis, Meissner corpuscles in the papillae next to them, Pacinian corpuscles in the deep
-# dermis and below. They differ by half between places and people.
-RECEPTORS = {"surface": 0.0, "meissner": 0.7e-3, "merkel": 0.75e-3, "pacini": 2e-3}
+from skinwave.scene.receptors import RECEPTORS
+from skinwave.scene.scene import Layer, Mounting, Phalanx, Relief, Sides
 
 
 @dataclass(frozen=True)
@@ -120,30 +110,28 @@ def _write_points(points: Points) -> list[list[float]]:
     return [_write_pair(point) for point in points]
 
 
-def _record(
-    section: str, name: str, make: Callable[..., Any], keys: Keys, required: int = 0
-) -> SceneKey:
-    """Key of a table that makes a record; the first `required` keys of the table must be given."""
+def _record(where: str, make: Callable[..., Any], required: int = 0) -> SceneKey:
+    """Key of a table [where] that makes a record; its first `required` keys must be given."""
 
     def read(key: str, value: Any) -> Any:
-        where = f"{section}.{key}"
-        return make(**_read_required(f"[{where}]", as_table(where, value), keys, required))
+        table = as_table(where, value)
+        return make(**_read_required(f"[{where}]", table, TABLES[where], required))
 
-    return SceneKey(name, read, partial(write_record, keys))
+    name = where.rpartition(".")[2]
+    return SceneKey(name, read, lambda record: write_record(TABLES[where], record))
 
 
-def _records(where: str, make: Callable[..., Any], keys: Keys) -> SceneKey:
+def _records(where: str, make: Callable[..., Any]) -> SceneKey:
     """Key of a list of tables [[where]] for records; all keys of each table must be given."""
 
     def read(key: str, value: Any) -> Any:
         tables = _of_type(key, value, list, f"a list of tables, each under [[{where}]]")
-        values = (
-            _read_required(f"[[{where}]]", as_table(where, t), keys, len(keys)) for t in tables
-        )
-        return tuple(make(**each) for each in values)
+        keys, title = TABLES[where], f"[[{where}]]"
+        each = [_read_required(title, as_table(where, t), keys, len(keys)) for t in tables]
+        return tuple(make(**values) for values in each)
 
     name = where.rpartition(".")[2]
-    return SceneKey(name, read, lambda records: [write_record(keys, record) for record in records])
+    return SceneKey(name, read, lambda each: [write_record(TABLES[where], one) for one in each])
 
 
 def _read_required(where: str, table: dict[str, Any], keys: Keys, required: int) -> dict[str, Any]:
@@ -157,16 +145,17 @@ def _material(key: str, value: Any) -> str | Material:
     if isinstance(value, str):
         return value
     where = f"[body.{key}]"
-    values = read_keys(where, as_table(key, value), MATERIAL)
-    return material_of(values, where, {field.name: own for own, field in MATERIAL.items()})
+    keys = TABLES["body.material"]
+    values = read_keys(where, as_table(key, value), keys)
+    return material_of(values, where, {field.name: own for own, field in keys.items()})
 
 
 def write_material(material: str | Material) -> Any:
     """Return the name of a material, or its table."""
     if isinstance(material, str):
         return material
-    values = values_of(material)
-    return {k: key.write(values[key.name]) for k, key in MATERIAL.items() if key.name in values}
+    values, keys = values_of(material), TABLES["body.material"]
+    return {k: key.write(values[key.name]) for k, key in keys.items() if key.name in values}
 
 
 def _table(key: str, value: Any) -> ModulusTable:
@@ -220,7 +209,7 @@ def _mounting(**values: Any) -> Mounting:
 def _sides(key: str, value: Any) -> str | Sides:
     if isinstance(value, str):
         return value
-    return _record("body", "sides", Sides, SIDES).read(key, value)
+    return _record("body.sides", Sides).read(key, value)
 
 
 def _direction(key: str, value: Any) -> str | tuple[float, ...]:
@@ -270,12 +259,6 @@ def _one_depth(key: str, value: Any) -> float:
     return _number(key, value) / 1e3
 
 
-def depth_of(word: str) -> float:
-    """Return the depth in m of a word on the command line: a number in mm, or a receptor."""
-    number = number_in(word)
-    return _one_depth("--depth", word if number is None else number)
-
-
 def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:
     if isinstance(depth, tuple):
         return [_in_units(z, 1e3) for z in depth]
@@ -284,7 +267,10 @@ def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:
 
 def _numbers_of(**keys: str) -> dict[str, SceneKey]:
     """Number keys by attribute name; the end of a key is its unit."""
-    units = {key: next((x for end, x in PER_SI.items() if key.endswith(end)), 1.0) for key in keys}
+    per_si = {
+        "_mm": 1e3, "_ms": 1e3, "_um": 1e6, "_percent": 100.0, "_deg": 180 / pi, "_g_m2": 1e3,
+    }  # fmt: skip
+    units = {key: next((x for end, x in per_si.items() if key.endswith(end)), 1.0) for key in keys}
     return {key: _scaled_number(name, units[key]) for key, name in keys.items()}
 
 
@@ -293,51 +279,48 @@ def _words_of(*names: str) -> dict[str, SceneKey]:
     return {name: SceneKey(name, as_text, str) for name in names}
 
 
-PER_SI = {
-    "_mm": 1e3, "_ms": 1e3, "_um": 1e6, "_percent": 100.0, "_deg": 180 / pi, "_g_m2": 1e3,
+SCALES = {"modulus_scale": "modulus", "loss_scale": "loss"}  # arguments of `Material.scaled`
+_MATERIAL = {"material": SceneKey("material", _material, write_material)}
+_DIRECTION = {"direction": SceneKey("direction", _direction, _or_word)}
+TABLES: Mapping[str, Keys] = {  # keys within tables of a section
+    "tacton.rhythm": {
+        "pulses_ms": SceneKey("pulses", _points, _write_points), **_numbers_of(ramp_ms="ramp"),
+    },
+    "tacton.signal": {
+        **_numbers_of(rate_hz="rate"), "samples": SceneKey("samples", _numbers, list),
+        **_words_of("role"),
+    },
+    "body.material": {
+        **_numbers_of(
+            density_kg_m3="density", shear_modulus_pa="shear_modulus", young_modulus_pa="young",
+            poisson="poisson", young_x_pa="young_x", young_y_pa="young_y", poisson_xy="poisson_xy",
+            shear_xy_pa="shear_xy", viscosity_pa_s="viscosity", loss_factor="loss_factor",
+        ),
+        **_words_of("law"),
+        **_numbers_of(fast_modulus_pa="fast_modulus", exponent="exponent", time_s="time"),
+        "table": SceneKey("table", _table, modulus_columns),
+        "prony": _records("body.material.prony", PronyTerm),
+    },
+    "body.material.prony": _numbers_of(modulus_pa="modulus", time_s="time"),
+    "body.layers": {**_numbers_of(thickness_mm="thickness"), **_MATERIAL},
+    "body.relief": _numbers_of(**{f"{each.name}_mm": each.name for each in fields(Relief)}),
+    "body.bone": _numbers_of(**{f"{each.name}_mm": each.name for each in fields(Phalanx)}),
+    "body.mounting": {
+        "edges": SceneKey("edges", _words, list),
+        **_words_of("support"),
+        "clips_mm": SceneKey("clips", _points, _write_points),
+        **_numbers_of(
+            clip_radius_mm="clip_radius", tension_x_n_per_m="tension_x",
+            tension_y_n_per_m="tension_y", curl_x_mm="curl_x", curl_y_mm="curl_y",
+            edge_loss="edge_loss", frame_width_mm="frame_width",
+        ),
+    },
+    "body.sides": _words_of(*(side.name for side in fields(Sides))),
+    "load.support_motion": {
+        **_numbers_of(amplitude_um="amplitude", frequency_hz="frequency"), **_DIRECTION,
+    },
 }  # fmt: skip
-PRONY = _numbers_of(modulus_pa="modulus", time_s="time")
-MODULI, LOSSES = "modulus_scale", "loss_scale"  # factors on a material in dotted keys
-SCALES = {MODULI: "modulus", LOSSES: "loss"}  # arguments of `Material.scaled`
-MATERIAL = {
-    **_numbers_of(
-        density_kg_m3="density", shear_modulus_pa="shear_modulus", young_modulus_pa="young",
-        poisson="poisson", young_x_pa="young_x", young_y_pa="young_y", poisson_xy="poisson_xy",
-        shear_xy_pa="shear_xy", viscosity_pa_s="viscosity", loss_factor="loss_factor",
-    ),
-    **_words_of("law"),
-    **_numbers_of(fast_modulus_pa="fast_modulus", exponent="exponent", time_s="time"),
-    "table": SceneKey("table", _table, modulus_columns),
-    "prony": _records("body.material.prony", PronyTerm, PRONY),
-}  # fmt: skip
-ALTERNATIVES = {  # keys of a material that replace each other
-    "young_modulus_pa": "shear_modulus_pa",
-    "shear_modulus_pa": "young_modulus_pa",
-}
-MOUNTING = {
-    "edges": SceneKey("edges", _words, list),
-    **_words_of("support"),
-    "clips_mm": SceneKey("clips", _points, _write_points),
-    **_numbers_of(
-        clip_radius_mm="clip_radius", tension_x_n_per_m="tension_x", tension_y_n_per_m="tension_y",
-        curl_x_mm="curl_x", curl_y_mm="curl_y", edge_loss="edge_loss",
-        frame_width_mm="frame_width",
-    ),
-}  # fmt: skip
-BONE, RELIEF = (
-    _numbers_of(**{f"{each.name}_mm": each.name for each in fields(record)})
-    for record in (Phalanx, Relief)
-)
-MADE_OF = {"material": SceneKey("material", _material, write_material)}
-LAYER = {**_numbers_of(thickness_mm="thickness"), **MADE_OF}
-SIDES = _words_of(*(side.name for side in fields(Sides)))
-PULSES = {"pulses_ms": SceneKey("pulses", _points, _write_points), **_numbers_of(ramp_ms="ramp")}
-SAMPLES = SceneKey("samples", _numbers, list)
-SIGNAL = {**_numbers_of(rate_hz="rate"), "samples": SAMPLES, **_words_of("role")}
-DIRECTION = {"direction": SceneKey("direction", _direction, _or_word)}
-SUPPORT_MOTION = {**_numbers_of(amplitude_um="amplitude", frequency_hz="frequency"), **DIRECTION}
-PATH = ("shape", "size", "speed", "sweep", "centre", "points", "times", "levels", "hold")
-SECTIONS = {
+SECTIONS: Mapping[str, Keys] = {
     "tacton": {
         **_numbers_of(
             amplitude_percent="amplitude", am_frequency_hz="am_frequency",
@@ -355,8 +338,8 @@ SECTIONS = {
         "hold": SceneKey("hold", _switch, bool),
         "foci": SceneKey("foci", _numbers, lambda phases: list(map(float, phases))),
         **_words_of("sharing"),
-        "rhythm": _record("tacton", "rhythm", Rhythm, PULSES, 1),
-        "signal": _record("tacton", "signal", Signal, SIGNAL, 2),
+        "rhythm": _record("tacton.rhythm", Rhythm, 1),
+        "signal": _record("tacton.signal", Signal, 2),
     },
     "focus": {
         **_numbers_of(height_mm="height"),
@@ -368,28 +351,28 @@ SECTIONS = {
         **_words_of("file", "unit"),
     },
     "body": {
-        **_words_of("kind"), **MADE_OF,
+        **_words_of("kind"), **_MATERIAL,
         **_numbers_of(size_x_mm="width", size_y_mm="height", thickness_mm="depth"),
         **_words_of("base"),
         "sides": SceneKey("sides", _sides, lambda x: x if isinstance(x, str) else x.by_name),
         **_numbers_of(base_stiffness_n_per_m3="base_stiffness"),
-        "layers": _records("body.layers", Layer, LAYER),
-        "relief": _record("body", "relief", Relief, RELIEF),
-        "bone": _record("body", "bone", Phalanx, BONE),
+        "layers": _records("body.layers", Layer),
+        "relief": _record("body.relief", Relief),
+        "bone": _record("body.bone", Phalanx),
         **_words_of("file", "unit", "up"),
         "regions": SceneKey(
             "regions", _regions, lambda named: {name: write_material(each) for name, each in named}
         ),
         "air": SceneKey("air", _air, lambda air: air),
-        "mounting": _record("body", "mounting", _mounting, MOUNTING),
+        "mounting": _record("body.mounting", _mounting),
         **_numbers_of(grammage_g_m2="grammage"),
     },
     "load": {
-        **_words_of("kind"), **DIRECTION,
+        **_words_of("kind"), **_DIRECTION,
         **_numbers_of(force_n="force"),
         "width_mm": replace(_scaled_number("width", 1e3), read=_contact_in_mm),
         **_numbers_of(gravity_m_per_s2="gravity"),
-        "support_motion": _record("load", "support_motion", SupportMotion, SUPPORT_MOTION, 2),
+        "support_motion": _record("load.support_motion", SupportMotion, 2),
     },
     "placement": {
         **_numbers_of(tilt_x_deg="tilt_x", tilt_y_deg="tilt_y"),
@@ -402,8 +385,6 @@ SECTIONS = {
         **_words_of("quantity"),
     },
 }  # fmt: skip
-
-
 DERIVED = {"grammage_g_m2"}  # keys that set others, and that are not written
 
 
@@ -422,36 +403,3 @@ def read_keys(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dic
         else:
             values[key] = field(key, value)
     return values
-
-
-def value_at(node: Any, key: str) -> Any:
-    """Return the value of a dotted key, such as "body.layers.0.thickness_mm", or None."""
-    for name in key.split("."):
-        if isinstance(node, list):
-            node = node[int(name)] if name.isdecimal() and int(name) < len(node) else None
-        else:
-            node = node.get(name) if isinstance(node, dict) else None
-    return node
-
-
-def with_value(node: Any, path: Sequence[str], value: Any, complete: Any = None) -> Any:
-    """Return a copy of a table with another value at the end of a path.
-
-    Missing tables on the path come from the `complete` table, and the name of a preset is replaced
-    by its table. Keys that the new key replaces are dropped.
-    """
-    if not path:
-        return value
-    head, rest = path[0], path[1:]
-    if isinstance(node, list):
-        if not (head.isdecimal() and int(head) < len(node)):
-            raise ValueError(f"there is no item '{head}' in a list of {len(node)}; count from 0")
-        k = int(head)
-        return [*node[:k], with_value(node[k], rest, value), *node[k + 1 :]]
-    if isinstance(node, str):
-        node = write_material(solid_of(choose("material", node, PRESETS)))
-    if not isinstance(node, dict):
-        raise ValueError(f"there is no key '{head}' in {node!r}; change the whole value")
-    before = complete.get(head) if isinstance(complete, dict) else None
-    inner = with_value(node.get(head, before or {}), rest, value, before)
-    return {name: x for name, x in node.items() if name != ALTERNATIVES.get(head)} | {head: inner}

@@ -14,11 +14,6 @@ from simple_model.layers.modulus_laws import COLUMNS
 PLAIN = ("density", "shear_modulus", "poisson")
 LOSSES = ("viscosity", "loss_factor", "prony")  # optional
 ALONG = ("young_x", "young_y", "poisson_xy")  # of an orthotropic sheet; shear_xy is optional
-TABULATED = ("density", "poisson", "table")
-LIMITS = {"density": (1e-9, 1e6), "shear_modulus": (1e-3, 1e13)}  # kg/m3, Pa
-LONGEST = 1e3  # s, viscosity over shear modulus
-SAME_MODULUS = 1e-3  # relative difference of a shear modulus and that from Young's modulus
-LEAST_POISSON = -0.999  # avoids a division by 0; the material checks Poisson's ratio
 
 
 def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Material:
@@ -51,8 +46,10 @@ def _check_limits(values: Mapping[str, Any], where: str, keys: Mapping[str, str]
             f"{where} is a fluid, because its shear modulus is 0; fluids are not modelled, so give "
             f"{keys['shear_modulus']} of a solid"
         )
-    slowest = LONGEST * values.get("shear_modulus", inf)
-    for name, (low, high) in {**LIMITS, "viscosity": (-inf, slowest)}.items():
+    longest = 1e3  # s, viscosity over shear modulus
+    slowest = longest * values.get("shear_modulus", inf)
+    limits = {"density": (1e-9, 1e6), "shear_modulus": (1e-3, 1e13), "viscosity": (-inf, slowest)}
+    for name, (low, high) in limits.items():
         if isfinite(value := values.get(name, low)) and not low <= value <= high:
             raise ValueError(
                 f"{where} has {keys[name]} = {value:g}, outside {max(low, 0):g} to {high:g}, "
@@ -69,9 +66,10 @@ def _by_shear(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) ->
         raise ValueError(f"{where} has {keys['young']} without {keys['poisson']}; give both")
     if not values["young"] >= 0:
         raise ValueError(f"{where} has {keys['young']} = {values['young']:g}; give a value above 0")
-    shear = values["young"] / (2 * (1 + max(values["poisson"], LEAST_POISSON)))
+    least_poisson = -0.999  # avoids a division by 0; the material checks Poisson's ratio
+    shear = values["young"] / (2 * (1 + max(values["poisson"], least_poisson)))
     given = rest.get("shear_modulus", shear)
-    if not abs(given - shear) <= SAME_MODULUS * abs(shear):
+    if not abs(given - shear) <= 1e-3 * abs(shear):
         raise ValueError(
             f"{where} has {keys['young']} = {values['young']:g}, a shear modulus of {shear:g} Pa "
             f"with its Poisson's ratio, but {keys['shear_modulus']} = {given:g}; remove one"
@@ -82,7 +80,7 @@ def _by_shear(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) ->
 def _kind(values: Mapping[str, Any]) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Kind of a material in words, and its required and optional attributes."""
     if "table" in values:
-        return "a table of complex moduli", TABULATED, ()
+        return "a table of complex moduli", ("density", "poisson", "table"), ()
     if "law" in values:
         law = MODULUS_LAWS[choose("material law", values["law"], MODULUS_LAWS)]
         own = (field.name for field in fields(law) if field.name != "shear_modulus")

@@ -6,16 +6,15 @@ from dataclasses import replace
 from simple_model import MovingPressure, Tacton, Trajectory, published_load
 from skinwave.scene.scene import BODIES, Body, Scene, with_body
 
-AM_FREQUENCIES = (0.0, 80.0, 140.0, 210.0)  # Hz
 MEASURED_ON = ("paper-sheet", "palm")  # the sheet that they measured, and skin
 SIZES = {"palm": 4.5e-3}  # m, of elements within 3 % for every Tacton but stm30, 6 %
-PATHS = ((0.0, 0.0), (0.010, 6.0), (0.020, 12.0), (0.030, 18.0))  # circle diameter m, speed m/s
 
 
 def tactons() -> Iterator[tuple[str, Tacton]]:
     """Yield names and Tactons of the 3 PureAM, 3 PureSTM and 9 AM+STM patterns of 1 s."""
-    for am_frequency in AM_FREQUENCIES:
-        for size, speed in PATHS:
+    circles = ((0.0, 0.0), (0.010, 6.0), (0.020, 12.0), (0.030, 18.0))  # diameter m, speed m/s
+    for am_frequency in (0.0, 80.0, 140.0, 210.0):  # Hz
+        for size, speed in circles:
             parts = [f"am{am_frequency:g}"] if am_frequency else []
             parts += [f"stm{1e3 * size:g}"] if size else []
             if parts:

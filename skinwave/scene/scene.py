@@ -45,7 +45,6 @@ SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest relevant 
 MOST_VALUES = 50_000_000  # of all waveforms of one response, 400 MB
 STILL = MovingPressure(tacton=Tacton())
 PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
-OUTERMOST = 0.75  # of half the width of a narrower body, where its surface is not yet too steep
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -238,7 +237,8 @@ def default_probes(body: Body) -> tuple[tuple[float, float], ...]:
     half, furthest = body.width / 2, PROBES[-1][0]
     if not body.of_kind.is_bounded or half > furthest:
         return PROBES
-    step = float(f"{OUTERMOST * half / (len(PROBES) - 1):.2g}")
+    outermost = 0.75  # of half the width, where the surface is not yet too steep
+    step = float(f"{outermost * half / (len(PROBES) - 1):.2g}")
     return tuple((round(k * step, 9), 0.0) for k in range(len(PROBES)))
 
 

@@ -35,11 +35,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from skinwave.scene.distributions import Distribution, Spread, within_factor
+from skinwave.scene.dotted_keys import value_at
 from skinwave.scene.file import to_table
-from skinwave.scene.keys import LOSSES, MODULI, value_at
+from skinwave.scene.keys import SCALES
 from skinwave.scene.scene import Scene
 
-PRESSURE, PRESSURE_FACTOR = "focus.peak_pressure_pa", 2.0
+PRESSURE = "focus.peak_pressure_pa"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,19 +51,19 @@ class MaterialSpread:
     losses: Distribution
 
 
-_PALM = MaterialSpread(moduli=within_factor(2.0), losses=within_factor(3.0))
-_LAYER = MaterialSpread(moduli=within_factor(3.2), losses=within_factor(3.0))
-_FOREARM = ("forearm-epidermis", "forearm-dermis", "forearm-hypodermis", "forearm-muscle")
 OF_PRESETS: Mapping[str, MaterialSpread] = {
-    **dict.fromkeys(("palm", "palm-stiff", "palm-zener"), _PALM),
-    "forearm": MaterialSpread(
-        moduli=Distribution(width=(1.86 / 7.86,)), losses=Distribution(width=(0.27,))
-    ),
-    **dict.fromkeys(("epidermis", "dermis", "fat", "muscle"), _LAYER),
-    **dict.fromkeys(_FOREARM, _LAYER),
-    "paper": MaterialSpread(moduli=within_factor(2.0), losses=within_factor(1.6)),
-    "paper-grain": MaterialSpread(moduli=within_factor(1.6), losses=within_factor(1.6)),
-}
+    name: MaterialSpread(moduli=moduli, losses=losses)
+    for names, moduli, losses in (
+        ("palm palm-stiff palm-zener", within_factor(2.0), within_factor(3.0)),
+        ("forearm", Distribution(width=(1.86 / 7.86,)), Distribution(width=(0.27,))),
+        ("epidermis dermis fat muscle", within_factor(3.2), within_factor(3.0)),
+        ("forearm-epidermis forearm-dermis forearm-hypodermis forearm-muscle",
+         within_factor(3.2), within_factor(3.0)),
+        ("paper", within_factor(2.0), within_factor(1.6)),
+        ("paper-grain", within_factor(1.6), within_factor(1.6)),
+    )
+    for name in names.split()
+}  # fmt: skip
 
 
 def spreads_of(scene: Scene) -> tuple[Spread, ...]:
@@ -77,7 +78,7 @@ def spreads_of(scene: Scene) -> tuple[Spread, ...]:
     if device and PRESSURE not in dict(scene.spreads) and scene.pressure.peak_pressure > 0:
         spreads.append(
             Spread(key=PRESSURE, value=scene.pressure.peak_pressure,
-                   distribution=within_factor(PRESSURE_FACTOR), implied=True)
+                   distribution=within_factor(2.0), implied=True)
         )  # fmt: skip
     if scene.body.of_kind.discretise:
         spreads += _of_materials(scene)
@@ -91,5 +92,5 @@ def _of_materials(scene: Scene) -> Iterator[Spread]:
     named |= {f"body.regions.{name}": material for name, material in body.regions}
     for key, material in named.items():
         if isinstance(material, str) and (known := OF_PRESETS.get(material)):
-            for scale, given in ((MODULI, known.moduli), (LOSSES, known.losses)):
+            for scale, given in zip(SCALES, (known.moduli, known.losses), strict=True):
                 yield Spread(key=f"{key}.{scale}", value=1.0, distribution=given, implied=True)

@@ -16,6 +16,7 @@ import tomli_w
 from meshes import reading
 from simple_model.choices import choose
 from skinwave.scene.distributions import Spread, parse_distribution, uniform
+from skinwave.scene.dotted_keys import with_value
 from skinwave.scene.file import (
     DEEPEST,
     dumps,
@@ -27,7 +28,7 @@ from skinwave.scene.file import (
     without_spreads,
 )
 from skinwave.scene.key_hints import key_hint
-from skinwave.scene.keys import SCALES, SECTIONS, with_value
+from skinwave.scene.keys import SCALES, SECTIONS
 from skinwave.scene.scene import BODIES, Body, Scene, solid_of, with_body
 from skinwave.scene.spreads import PRESSURE
 from skinwave.system.plain_text import number_in
@@ -36,7 +37,6 @@ from skinwave.typing import Floats
 DESIGNS = ("factorial", "zip", "lhs", "sobol")
 SAMPLED = ("lhs", "sobol")  # designs with --samples
 MOST_RUNS = 100_000
-BODY = "body"  # key of a whole body, the name of a preset or a file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,8 +254,8 @@ def _check_count(count: int) -> None:
 def _checked_key(key: str) -> str:
     """The key, if scenes have it; keys inside a value, like material.poisson, are checked later."""
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
-    section, _, name = key.partition(".")
-    if key != BODY and (key.count(".") > DEEPEST or f"{section}.{name.split('.')[0]}" not in known):
+    first = ".".join(key.split(".")[:2])
+    if key != "body" and (key.count(".") > DEEPEST or first not in known):
         hint = key_hint(key, known) or "; write a key such as tacton.size_mm"
         raise ValueError(f"'{key[:60]}' is not a key of a scene{hint}")
     return key
@@ -286,10 +286,13 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
 
 
 def _change(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
-    """A copy of a table with other values: first of the body, then of keys in it."""
-    for key in sorted(varied, key=lambda key: key != BODY):
-        if key == BODY:
-            table = table | {BODY: _body(varied[key])}
+    """A copy of a table with other values: first of the body, then of keys in it.
+
+    The key "body" has the name of a preset or a file.
+    """
+    for key in sorted(varied, key=lambda key: key != "body"):
+        if key == "body":
+            table = table | {"body": _body(varied[key])}
         else:
             table = with_value(table, key.split("."), varied[key], complete)
     return table
@@ -298,7 +301,7 @@ def _change(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
 def _body(name: Any) -> Any:
     """The table of a preset or of a file."""
     if name in BODIES:
-        return to_table(with_body(loads(""), BODIES[name]))[BODY]
+        return to_table(with_body(loads(""), BODIES[name]))["body"]
     if not Path(str(name)).is_file():
         raise ValueError(
             f"body '{name}' is neither a file nor one of {', '.join(BODIES)}; use one of these "

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 
-from simple_model.numbers import plural
+from simple_model.numbers import first_few, plural
 
 REASONS = (ValueError, ArithmeticError, MemoryError, OSError, BrokenProcessPool)
 
@@ -33,8 +33,5 @@ def failure_text(failures: Mapping[str, str], most: int = 3) -> str:
     by_reason: dict[str, list[str]] = {}
     for name, why in failures.items():
         by_reason.setdefault(why.rstrip("."), []).append(name)
-    each = [
-        f"{', '.join(names[:most])}{f' and {len(names) - most} more' * (len(names) > most)} ({why})"
-        for why, names in by_reason.items()
-    ]
+    each = [f"{first_few(names, most)} ({why})" for why, names in by_reason.items()]
     return f"{plural(len(failures), 'part')} of this result failed: {'; '.join(each)}." * bool(each)
