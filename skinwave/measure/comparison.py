@@ -129,7 +129,12 @@ def compare_measured(measured: Measured, runs: Sequence[Run]) -> MeasuredCompari
     scene = (bodies or list(runs))[-1].scene  # a body has the load of the scene file
     names, frequencies, unresolved = lines_to_compare(measurement, scene)
     lines = lines_of(measurement, frequencies)
-    named = by_name(scene, names, lines, unresolved, _spectrum_of(measurement))
+    whole = measurement.frequencies, np.abs(measurement.mean)
+    if not measurement.is_spectrum:
+        whole = spectrum(as_response(measurement))
+    elif not bin_width(measurement):  # single lines
+        whole = np.empty(0), np.empty((0, len(measurement.places)))
+    named = by_name(scene, names, lines, unresolved, whole)
     return MeasuredComparison(
         measurement=measurement, scene=scene, names=names, lines=lines,
         present=holm(lines.p_values(lines.mean)), unresolved=unresolved,
@@ -174,15 +179,6 @@ def _silence(times: Floats) -> Response:
     return Response(
         model=MEASURED, times=times, probes=np.zeros((1, 2)), values=np.zeros((len(times), 1))
     )
-
-
-def _spectrum_of(measurement: Measurement) -> tuple[Floats, Floats]:
-    """Return the amplitude spectrum of the mean, empty for single lines."""
-    if not measurement.is_spectrum:
-        return spectrum(as_response(measurement))
-    if not bin_width(measurement):
-        return np.empty(0), np.empty((0, len(measurement.places)))
-    return measurement.frequencies, np.abs(measurement.mean)
 
 
 def _column(measured: Measured, run: Run, lines: MeasuredLines) -> ModelColumn:

@@ -23,8 +23,7 @@ from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import noise_floor
 from skinwave.typing import Floats
 
-MAINS = (50.0, 60.0)  # Hz
-MAINS_WANDER = 0.004  # of its frequency
+MAINS = {50.0: 0.2, 60.0: 0.24}  # Hz, and how far the frequency wanders
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,7 +77,11 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
         missing.append(f"lines were searched at {len(kept)} of {len(varying)} places")
     if not measured.is_spectrum and stop < len(measured.times):
         missing.append(f"lines were searched in the first {stop / measured.rate:g} s")
-    spectrum = _spectrum(measured, kept, part, alarm)
+    spectrum = None
+    if len(kept) and measured.is_spectrum:
+        spectrum = _of_amplitudes(measured, kept, alarm)
+    elif len(kept) and part.stop - part.start >= FEWEST:
+        spectrum = find_lines(measured.values[:, part, kept], measured.rate, alarm=alarm)
     if not measured.is_spectrum and spectrum and spectrum.lines:
         searched = replace(
             measured, times=measured.times[:stop], values=measured.values[:, :stop, kept],
@@ -90,18 +93,6 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
         measured=measured, spectrum=spectrum, origins=_origins(measured, spectrum, part), kept=kept,
         clipped=_clipped_samples(measured), constant=constant, missing=tuple(missing),
     )  # fmt: skip
-
-
-def _spectrum(
-    measured: Measurement, kept: np.ndarray, part: slice, alarm: float
-) -> LineSpectrum | None:
-    if not len(kept):
-        return None
-    if measured.is_spectrum:
-        return _of_amplitudes(measured, kept, alarm)
-    if part.stop - part.start < FEWEST:
-        return None
-    return find_lines(measured.values[:, part, kept], measured.rate, alarm=alarm)
 
 
 def unsteady(
@@ -122,10 +113,11 @@ def unsteady(
     if half < 2:
         return []
     amplitudes, rest = fit_lines(as_response(measured), frequencies)
+    bare = replace(measured, drive=np.empty(0))
     first, second = (
         lines_of(
-            replace(measured, times=measured.times[part], values=rest[None, part],
-                    drive=np.empty(0)), frequencies, settle=0.0,
+            replace(bare, times=measured.times[part], values=rest[None, part]), frequencies,
+            settle=0.0,
         )
         for part in (slice(count - 2 * half, count - half), slice(count - half, count))
     )  # fmt: skip
@@ -183,9 +175,8 @@ def _origins(measured: Measurement, spectrum: LineSpectrum | None, part: slice) 
 
 
 def _is_multiple(line: SpectralLine, base: SpectralLine, n: int, duration: float) -> bool:
-    """Whether a line can be the n-th multiple of another within their errors."""
-    same_line = 4.0  # standard errors between two estimates of one line
-    within = same_line * float(np.hypot(line.error, n * base.error)) + 0.05 / duration
+    """Whether a line can be the n-th multiple of another within four standard errors."""
+    within = 4.0 * float(np.hypot(line.error, n * base.error)) + 0.05 / duration
     return abs(line.frequency - n * base.frequency) <= within
 
 
@@ -213,9 +204,9 @@ def _mains(
 ) -> list[tuple[float, SpectralLine]]:
     """Return the mains frequencies that are present, with the nearest line."""
     present = []
-    for mains in MAINS:
+    for mains, wander in MAINS.items():
         near = [line for k, line in enumerate(lines)
-                if k not in driven and abs(line.frequency / mains - 1) <= MAINS_WANDER]  # fmt: skip
+                if k not in driven and abs(line.frequency - mains) <= wander]  # fmt: skip
         if near:
             present.append((mains, min(near, key=lambda line: abs(line.frequency - mains))))
     return present
@@ -274,13 +265,11 @@ def _hum(measured: Measurement, pressure: MovingPressure) -> list[str]:
     f, names = load.frequencies[strong], np.array(load.names)[strong]
     apart = 1 / float(np.ptp(measured.times))
 
-    most_hum_on_load = 7  # times the mains frequency
-
     def on(mains: float, within: float) -> np.ndarray:
-        n = np.clip(np.round(f / mains), 1, most_hum_on_load)
+        n = np.clip(np.round(f / mains), 1, 7)  # multiples that may be as strong as a line
         return np.asarray(np.abs(f - n * mains) <= apart + within * n * mains)
 
-    if not any(on(mains, MAINS_WANDER).any() for mains in MAINS):
+    if not any(on(mains, wander / mains).any() for mains, wander in MAINS.items()):
         return []  # without the slow search for lines
     lines = inspect(measured).lines
     driven = [k for k, x in enumerate(lines) if (np.abs(f - x.frequency) <= apart).any()]

@@ -97,7 +97,12 @@ def intervals(solution: Solution) -> Intervals:
         widenings, across = (
             widening(solution.residual, rows.reshape(-1, *shape)) for rows in (moves, back.T)
         )
-    beyond, misfit = _beyond_noise(solution, test), _misfit(solution)
+    # Correlated values count as fewer (Bayley and Hammersley, J R Stat Soc 8:184 (1946)).
+    shared = 1 + 2 * float((test.correlations**2).sum())
+    data = solution.problem.data
+    beyond = shared * beyond_noise(solution.cost / shared, solution.dof / shared, data.freedom)
+    away = np.linalg.norm(solution.problem.predict(solution.u) - data.values)
+    misfit = float(away) / max(float(np.linalg.norm(data.values)), 1e-300)
     widenings = np.hypot(widenings, systematic(beyond / scale) / width)
     half = width * widenings * error
     hidden = half >= UNRESOLVED
@@ -123,20 +128,6 @@ def intervals(solution: Solution) -> Intervals:
     bare = (replace(e, low=np.nan, high=np.nan, is_curved=False) for e in found.estimates)
     none = np.full_like(correlations, np.nan)
     return replace(found, estimates=tuple(bare), correlations=none, unresolved=())
-
-
-def _beyond_noise(solution: Solution, test: Whiteness) -> float:
-    """Return chi squared beyond the noise, whose correlated values count as fewer (Bayley and
-    Hammersley, J R Stat Soc 8:184 (1946)).
-    """
-    shared, freedom = 1 + 2 * float((test.correlations**2).sum()), solution.problem.data.freedom
-    return shared * beyond_noise(solution.cost / shared, solution.dof / shared, freedom)
-
-
-def _misfit(solution: Solution) -> float:
-    values = solution.problem.data.values
-    away = solution.problem.predict(solution.u) - values
-    return float(np.linalg.norm(away)) / max(float(np.linalg.norm(values)), 1e-300)
 
 
 def _estimate(solution: Solution, k: int, to_end: Floats, away: float) -> Estimate:

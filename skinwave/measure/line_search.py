@@ -135,18 +135,15 @@ def peaks(
     for k in sorted(bins.tolist(), key=lambda k: -height[k]):
         if np.abs(np.append(known, lines) - k).min(initial=np.inf) < resolved:
             continue
-        leaks = [density[j] * _side_lobe(abs(k - j)) for j in lines]
+        apart = [abs(k - j) for j in lines]
+        # Four times the bound of the Hann window's side lobes, relative to the line.
+        leaks = [density[j] * (1.0 if n < 2 else 4.0 / (np.pi * n * (n**2 - 1)) ** 2)
+                 for j, n in zip(lines, apart, strict=True)]  # fmt: skip
         if not lines or (density[k] > np.sum(leaks, axis=0))[chance[k] < alarm].any():
             lines.append(k)
     at = np.array(lines[: MOST_LINES - len(known)], int)
     left, middle, right = (np.log(height[at + shift]) for shift in (-1, 0, 1))
     return at + (left - right) / (left - 2 * middle + right) / 2, least[at]
-
-
-def _side_lobe(bins: int) -> float:
-    """Return a bound of the Hann window's power at a distance in bins, relative to the line."""
-    leakage = 4.0  # times the bound of the Hann window's side lobes
-    return 1.0 if bins < 2 else leakage / (np.pi * bins * (bins**2 - 1)) ** 2
 
 
 def _are_significant(fit: _Fit, floor: Floats, rate: float, alarm: float) -> np.ndarray:

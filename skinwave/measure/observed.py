@@ -101,7 +101,7 @@ def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
 
 
 def load_lines(measured: Measurement, aim: Target) -> LoadLines:
-    """Return those lines of a load in a measurement that the model predicts."""
+    """Return the lines of the load that are in the measurement and that the model predicts."""
     load, lost = line_names(aim.scene.pressure), dict[str, float]()
     if measured.is_spectrum:
         away = np.abs(measured.frequencies[:, None] - load.frequencies).min(axis=0)
@@ -264,7 +264,7 @@ def _in_time(
 
 
 def _positive(error: Floats, values: np.ndarray) -> Floats:
-    """Return errors limited to values above 0, for repetitions without noise."""
+    """Return errors that are above 0 even if repetitions are equal."""
     least = 1e-9 * float(np.abs(values).max(initial=0.0)) or 1e-300
     return np.asarray(np.maximum(error, least))
 

@@ -86,7 +86,12 @@ class Parameters:
 
 def parse(vary: Sequence[str], tie: Sequence[str] = ()) -> Parameters:
     """Parse texts `KEY=low:high` and `KEY=expression` into parameters."""
-    ties = dict(_tie(text) for text in tie)
+    ties = {}
+    for text in tie:
+        key, _, right = text.partition("=")
+        if not right.strip():
+            raise ValueError(f"--tie {text} has no expression; write KEY=expression")
+        ties[_key(key)] = right.strip()
     return Parameters(free=tuple(map(_parameter, vary)), ties=ties)
 
 
@@ -97,13 +102,6 @@ def _parameter(text: str) -> Parameter:
         raise ValueError(f"--vary {text} has no limits; write KEY=low:high")
     low, high = (x for x in limits if x is not None)
     return Parameter(key=_key(key), low=low, high=high)
-
-
-def _tie(text: str) -> tuple[str, str]:
-    key, equals, right = text.partition("=")
-    if not equals or not right.strip():
-        raise ValueError(f"--tie {text} has no expression; write KEY=expression")
-    return _key(key), right.strip()
 
 
 def _key(text: str) -> str:

@@ -85,8 +85,11 @@ def complete(recording: Recording, given: Given, path: Path) -> Measurement:
     factor = _amplitude(recording, given, remarks)
     quantity, unit = _quantity(recording, given)
     _check_counts(recording, given, unit, remarks)
-    recording = replace(recording, places=_places(recording, given))
-    recording = _without_empty(recording, remarks)
+    places, count = recording.places, recording.values.shape[2]
+    places = places if given.places is None else given.places
+    if places.shape != (count, 2):
+        raise ValueError(f"--places has {len(places)} places, and the file has {count} signals")
+    recording = _without_empty(replace(recording, places=places), remarks)
     times, recording = _sample_evenly(recording, given, remarks)
     sign = given.sign or recording.sign
     values = units.in_si(recording.values, units.motion_divisor(unit, quantity))
@@ -166,14 +169,6 @@ def _quantity(recording: Recording, given: Given) -> tuple[str, str]:
     if not quantity:
         units.motion_divisor(unit, "displacement")  # whose error names what is wrong
     return choose("quantity", quantity, [name for name, q in QUANTITIES.items() if q.of_body]), unit
-
-
-def _places(recording: Recording, given: Given) -> Floats:
-    places = recording.places if given.places is None else given.places
-    count = recording.values.shape[2]
-    if places.shape != (count, 2):
-        raise ValueError(f"--places has {len(places)} places, and the file has {count} signals")
-    return places
 
 
 def _without_empty(recording: Recording, remarks: list[str]) -> Recording:

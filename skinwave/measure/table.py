@@ -101,8 +101,8 @@ def recording_of(table: Table, given: Given) -> Recording:
 def _sign(columns: list[Column], given: Given) -> int:
     """Return the sign of responses whose headings name two signed axes, such as "+Z/Force-Z".
 
-    A force and a motion into the body are alike, so that it is the product of both signs. Returns 0
-    if no heading names both.
+    It is the product of both signs, because force and motion are both positive into the body.
+    Returns 0 if no heading names both.
     """
     force = re.compile("force|kraft|hammer|shaker|excit|anreg", re.IGNORECASE)
     signed = re.compile(

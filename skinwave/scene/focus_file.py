@@ -63,7 +63,7 @@ def read_spot(path: str | Path, unit: str = "", *, needs_peak: bool = False) -> 
 
 @lru_cache(maxsize=4)  # the scenes of a sweep read the same file
 def _read_spot(path: Path, modified: int, size: int, unit: str, needs_peak: bool) -> SpotMap:
-    """The same for a file that was modified at a time in ns and has a size in bytes."""
+    """Read a file that was modified at a time in ns and has a size in bytes."""
     return _spot(list(_read(path)), str(path), unit, needs_peak)
 
 

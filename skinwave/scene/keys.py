@@ -10,7 +10,6 @@ from simple_model.choices import choose
 from simple_model.layers.modulus_laws import COLUMNS
 from simple_model.load.focus import FOCI, FocalSpot
 from simple_model.load.spot_map import SpotMap
-from simple_model.load.trajectory import Points
 from skinwave.scene.key_hints import key_hint
 from skinwave.scene.load import SupportMotion
 from skinwave.scene.material_file import material_of, modulus_columns, values_of
@@ -63,22 +62,38 @@ def as_table(key: str, value: Any) -> dict[str, Any]:
     return table
 
 
-def _switch(key: str, value: Any) -> bool:
-    return bool(_of_type(key, value, bool, "true or false"))
+def _switch(must: str) -> Callable[[str, Any], bool]:
+    return lambda key, value: bool(_of_type(key, value, bool, must))
 
 
-def _air(key: str, value: Any) -> bool | str:
-    must = 'false, "free" or "baffle"'
-    return value if isinstance(value, str) else bool(_of_type(key, value, bool, must))
+def _word_or(own: SceneKey) -> SceneKey:
+    """Key of a word, or of the value of another key."""
+    return SceneKey(
+        own.name,
+        lambda key, value: value if isinstance(value, str) else own.read(key, value),
+        lambda value: value if isinstance(value, str) else own.write(value),
+    )
 
 
-def _numbers(key: str, value: Any) -> tuple[float, ...]:
-    return tuple(_number(key, x) for x in _of_type(key, value, list, "a list of numbers"))
+def _list_of(own: SceneKey, must: str) -> SceneKey:
+    """Key of a list of the values of another key."""
+    return SceneKey(
+        own.name,
+        lambda key, value: tuple(own.read(key, x) for x in _of_type(key, value, list, must)),
+        lambda values: [own.write(x) for x in values],
+    )
 
 
-def _words(key: str, value: Any) -> tuple[str, ...]:
-    must = 'a list of words, such as ["left"]'
-    return tuple(as_text(key, word) for word in _of_type(key, value, list, must))
+def _numbers_in_list(name: str) -> SceneKey:
+    return _list_of(_scaled_number(name), "a list of numbers")
+
+
+def _point(name: str) -> SceneKey:
+    return SceneKey(name, _pair_in_mm, lambda pair: [_in_units(x, 1e3) for x in pair])
+
+
+def _points(name: str) -> SceneKey:
+    return _list_of(_point(name), "a list of pairs, such as [[0, 0], [5, 0]]")
 
 
 def _pair(key: str, value: Any) -> tuple[float, float]:
@@ -95,19 +110,6 @@ def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
             f"{key} has the point [{x}, {y}]; coordinates must be finite numbers in mm"
         )
     return x / 1e3, y / 1e3
-
-
-def _points(key: str, value: Any) -> Points:
-    pairs = _of_type(key, value, list, "a list of pairs, such as [[0, 0], [5, 0]]")
-    return tuple(_pair_in_mm(key, pair) for pair in pairs)
-
-
-def _write_pair(pair: tuple[float, float]) -> list[float]:
-    return [_in_units(x, 1e3) for x in pair]
-
-
-def _write_points(points: Points) -> list[list[float]]:
-    return [_write_pair(point) for point in points]
 
 
 def _record(where: str, make: Callable[..., Any], required: int = 0) -> SceneKey:
@@ -164,7 +166,7 @@ def _table(key: str, value: Any) -> ModulusTable:
             f"{key} = {value!r} names a file, which is possible only in a scene file; give the "
             f"numbers as {key}.{', '.join(COLUMNS)}"
         )
-    where, columns = f"[body.material.{key}]", {n: SceneKey(n, _numbers, list) for n in COLUMNS}
+    where, columns = f"[body.material.{key}]", {n: _numbers_in_list(n) for n in COLUMNS}
     values = _read_required(where, as_table(key, value), columns, len(columns))
     frequencies, storage, loss = (values[name] for name in COLUMNS)
     if not len(frequencies) == len(storage) == len(loss):
@@ -206,21 +208,6 @@ def _mounting(**values: Any) -> Mounting:
     return Mounting(**({"edges": ()} if values.get("clips") else {}) | values)
 
 
-def _sides(key: str, value: Any) -> str | Sides:
-    if isinstance(value, str):
-        return value
-    return _record("body.sides", Sides).read(key, value)
-
-
-def _direction(key: str, value: Any) -> str | tuple[float, ...]:
-    return value if isinstance(value, str) else _numbers(key, value)
-
-
-def _or_word(value: Any) -> Any:
-    """A word, or numbers as a list."""
-    return value if isinstance(value, str) else list(value)
-
-
 def _contact_in_mm(key: str, value: Any) -> float:
     if not (width := _number(key, value)):
         raise ValueError(
@@ -247,22 +234,21 @@ def _in_units(value: float, per_unit: float) -> float:
     return next((x for x in nearest if x / per_unit == value), near)
 
 
-def _depth(key: str, value: Any) -> float | tuple[float, ...]:
-    if isinstance(value, list):
-        return tuple(_one_depth(key, each) for each in value)
-    return _one_depth(key, value)
-
-
 def _one_depth(key: str, value: Any) -> float:
     if isinstance(value, str):
         return RECEPTORS[choose(key, value, RECEPTORS)]
     return _number(key, value) / 1e3
 
 
-def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:
-    if isinstance(depth, tuple):
-        return [_in_units(z, 1e3) for z in depth]
-    return _in_units(depth, 1e3)
+def _depths() -> SceneKey:
+    """Key of a depth, or of a list of depths."""
+    one = SceneKey("depth", _one_depth, lambda depth: _in_units(depth, 1e3))
+    each = _list_of(one, "a list of depths")
+    return SceneKey(
+        one.name,
+        lambda key, value: (each if isinstance(value, list) else one).read(key, value),
+        lambda depth: (each if isinstance(depth, tuple) else one).write(depth),
+    )
 
 
 def _numbers_of(**keys: str) -> dict[str, SceneKey]:
@@ -281,13 +267,13 @@ def _words_of(*names: str) -> dict[str, SceneKey]:
 
 SCALES = {"modulus_scale": "modulus", "loss_scale": "loss"}  # arguments of `Material.scaled`
 _MATERIAL = {"material": SceneKey("material", _material, write_material)}
-_DIRECTION = {"direction": SceneKey("direction", _direction, _or_word)}
+_DIRECTION = {"direction": _word_or(_numbers_in_list("direction"))}
 TABLES: Mapping[str, Keys] = {  # keys within tables of a section
     "tacton.rhythm": {
-        "pulses_ms": SceneKey("pulses", _points, _write_points), **_numbers_of(ramp_ms="ramp"),
+        "pulses_ms": _points("pulses"), **_numbers_of(ramp_ms="ramp"),
     },
     "tacton.signal": {
-        **_numbers_of(rate_hz="rate"), "samples": SceneKey("samples", _numbers, list),
+        **_numbers_of(rate_hz="rate"), "samples": _numbers_in_list("samples"),
         **_words_of("role"),
     },
     "body.material": {
@@ -306,9 +292,9 @@ TABLES: Mapping[str, Keys] = {  # keys within tables of a section
     "body.relief": _numbers_of(**{f"{each.name}_mm": each.name for each in fields(Relief)}),
     "body.bone": _numbers_of(**{f"{each.name}_mm": each.name for each in fields(Phalanx)}),
     "body.mounting": {
-        "edges": SceneKey("edges", _words, list),
+        "edges": _list_of(_words_of("edges")["edges"], 'a list of words, such as ["left"]'),
         **_words_of("support"),
-        "clips_mm": SceneKey("clips", _points, _write_points),
+        "clips_mm": _points("clips"),
         **_numbers_of(
             clip_radius_mm="clip_radius", tension_x_n_per_m="tension_x",
             tension_y_n_per_m="tension_y", curl_x_mm="curl_x", curl_y_mm="curl_y",
@@ -331,12 +317,12 @@ SECTIONS: Mapping[str, Keys] = {
         **_words_of("shape"),
         **_numbers_of(size_mm="size", speed_m_per_s="speed"),
         **_words_of("sweep"),
-        "centre_mm": SceneKey("centre", _pair_in_mm, _write_pair),
-        "points_mm": SceneKey("points", _points, _write_points),
-        "times_s": SceneKey("times", _numbers, list),
-        "levels": SceneKey("levels", _numbers, list),
-        "hold": SceneKey("hold", _switch, bool),
-        "foci": SceneKey("foci", _numbers, lambda phases: list(map(float, phases))),
+        "centre_mm": _point("centre"),
+        "points_mm": _points("points"),
+        "times_s": _numbers_in_list("times"),
+        "levels": _numbers_in_list("levels"),
+        "hold": SceneKey("hold", _switch("true or false"), bool),
+        "foci": _numbers_in_list("foci"),
         **_words_of("sharing"),
         "rhythm": _record("tacton.rhythm", Rhythm, 1),
         "signal": _record("tacton.signal", Signal, 2),
@@ -354,7 +340,7 @@ SECTIONS: Mapping[str, Keys] = {
         **_words_of("kind"), **_MATERIAL,
         **_numbers_of(size_x_mm="width", size_y_mm="height", thickness_mm="depth"),
         **_words_of("base"),
-        "sides": SceneKey("sides", _sides, lambda x: x if isinstance(x, str) else x.by_name),
+        "sides": _word_or(_record("body.sides", Sides)),
         **_numbers_of(base_stiffness_n_per_m3="base_stiffness"),
         "layers": _records("body.layers", Layer),
         "relief": _record("body.relief", Relief),
@@ -363,7 +349,7 @@ SECTIONS: Mapping[str, Keys] = {
         "regions": SceneKey(
             "regions", _regions, lambda named: {name: write_material(each) for name, each in named}
         ),
-        "air": SceneKey("air", _air, lambda air: air),
+        "air": _word_or(SceneKey("air", _switch('false, "free" or "baffle"'), bool)),
         "mounting": _record("body.mounting", _mounting),
         **_numbers_of(grammage_g_m2="grammage"),
     },
@@ -376,12 +362,12 @@ SECTIONS: Mapping[str, Keys] = {
     },
     "placement": {
         **_numbers_of(tilt_x_deg="tilt_x", tilt_y_deg="tilt_y"),
-        "offset_mm": SceneKey("offset", _pair_in_mm, _write_pair),
+        "offset_mm": _point("offset"),
         **_numbers_of(lift_mm="lift"),
     },
     "probes": {
-        "points_mm": SceneKey("probes", _points, _write_points),
-        "depth_mm": SceneKey("depth", _depth, _write_depth),
+        "points_mm": _points("probes"),
+        "depth_mm": _depths(),
         **_words_of("quantity"),
     },
 }  # fmt: skip

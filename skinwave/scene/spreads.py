@@ -32,7 +32,7 @@ give 59 to 87 Pa (Liebler et al., J Acoust Soc Am 148:1713 (2020); HandyBeam; Ac
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from skinwave.scene.distributions import Distribution, Spread, within_factor
 from skinwave.scene.dotted_keys import value_at
@@ -43,16 +43,9 @@ from skinwave.scene.scene import Scene
 PRESSURE = "focus.peak_pressure_pa"
 
 
-@dataclass(frozen=True, kw_only=True)
-class MaterialSpread:
-    """Distributions, about 1, of the factors on all moduli and on all losses of a material."""
-
-    moduli: Distribution
-    losses: Distribution
-
-
-OF_PRESETS: Mapping[str, MaterialSpread] = {
-    name: MaterialSpread(moduli=moduli, losses=losses)
+# Distributions about 1 of the factors on all moduli, and on all losses, of a material.
+OF_PRESETS: Mapping[str, tuple[Distribution, Distribution]] = {
+    name: (moduli, losses)
     for names, moduli, losses in (
         ("palm palm-stiff palm-zener", within_factor(2.0), within_factor(3.0)),
         ("forearm", Distribution(width=(1.86 / 7.86,)), Distribution(width=(0.27,))),
@@ -92,5 +85,5 @@ def _of_materials(scene: Scene) -> Iterator[Spread]:
     named |= {f"body.regions.{name}": material for name, material in body.regions}
     for key, material in named.items():
         if isinstance(material, str) and (known := OF_PRESETS.get(material)):
-            for scale, given in zip(SCALES, (known.moduli, known.losses), strict=True):
+            for scale, given in zip(SCALES, known, strict=True):
                 yield Spread(key=f"{key}.{scale}", value=1.0, distribution=given, implied=True)

@@ -119,7 +119,7 @@ def test_the_fitted_scene_has_the_spreads_of_the_estimates(scene, lines):
         ends = given[each.key].distribution.quantile(each.value, [0.025, 0.975])
         assert ends == pytest.approx([each.low, each.high], rel=0.01)
     assert given[VISCOSITY].value == 5
-    assert given[VISCOSITY].distribution == OF_PRESETS["palm"].losses
+    assert given[VISCOSITY].distribution == OF_PRESETS["palm"][1]
 
 
 def test_an_estimate_at_a_limit_and_a_misfit_give_warnings(scene, lines):
