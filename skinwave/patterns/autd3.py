@@ -5,7 +5,9 @@ The device steps through a list of foci at 40 kHz / N and repeats it, so that it
 is 40 kHz / (N points). The script uses the nearest such frequency.
 """
 
+from importlib.resources import files
 from math import ceil
+from string import Template
 
 import numpy as np
 
@@ -17,80 +19,13 @@ from skinwave.system.formats import PATTERN_WRITERS, register
 from skinwave.typing import Floats
 
 TICK = 40_000.0  # Hz
-PACKAGES = {  # imports and body of the script
-    "pyautd3": (
-        """
-# Replace Nop by the link of your devices.
-
-import time
-
-import numpy as np
-from pyautd3 import AUTD3, ControlPoint, ControlPoints, Controller, FociSTM, Null
-from pyautd3 import SamplingConfig, Silencer
-from pyautd3.link.nop import Nop
-from pyautd3.modulation import Custom
-""",
-        """
-with Controller.open([AUTD3(pos=[0.0, 0.0, 0.0], rot=[1, 0, 0, 0])], Nop()) as autd:
-    centre = autd.center()
-    foci = [
-        ControlPoints([ControlPoint(centre + np.array([x, y, HEIGHT])) for x, y in pattern])
-        for pattern in PLACES
-    ]
-    autd.send(Silencer.disable())
-    modulation = Custom(np.array(MODULATION, dtype=np.uint8), SamplingConfig(MODULATION_TICKS))
-    autd.send((modulation, FociSTM(foci, SamplingConfig(PATTERN_TICKS))))
-    time.sleep(DURATION)
-    autd.send(Null())
-""",
-    ),
-    "autd3": (
-        """
-# Replace emulator.option() by UdpOption() for devices; pip install autd3 autd3-modulation.
-
-import asyncio
-
-import numpy as np
-from autd3 import Client, ClientConfig, UdpEmulator
-from autd3.commands import FociStm, FociStmOption, Modulation, SetSilencer
-from autd3.geometry import Autd3, Geometry
-from autd3.value import ControlPoint, ControlPoints, SamplingConfig
-from autd3_modulation import ModulationBuffer
-""",
-        """
-
-def commands(geometry):
-    centre = geometry.center()
-    foci = [
-        ControlPoints([ControlPoint(centre + np.array([x, y, HEIGHT]), 0) for x, y in pattern], 255)
-        for pattern in PLACES
-    ]
-    samples = ModulationBuffer.from_bytes(MODULATION)
-    modulation = Modulation(SamplingConfig(MODULATION_TICKS), samples)
-    return [modulation, FociStm(SamplingConfig(PATTERN_TICKS), foci, FociStmOption())]
-
-
-async def play():
-    geometry, emulator = Geometry([Autd3()]), UdpEmulator(1)
-    async with await Client.open(geometry, emulator.option(), ClientConfig()) as client:
-        await client.send(SetSilencer.disable())
-        await client.send(commands(geometry))
-        await asyncio.sleep(DURATION)
-        await client.silent_stop()
-
-
-if __name__ == "__main__":
-    asyncio.run(play())
-""",
-    ),
-}
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     """Return the script, and notes on its approximations; raise a ValueError if the package is
     unknown, if the path is too slow, or if no sound produces the load.
     """
-    choose("--package", options.package, PACKAGES)
+    choose("--package", options.package, ("pyautd3", "autd3"))
     pressure, path = scene.pressure, scene.tacton.trajectory
     foci, in_turn = len(scene.tacton.foci), scene.tacton.sharing == "time_multiplexed"
     count, division = steps(path.drawing_frequency, foci if in_turn else 1)
@@ -111,25 +46,26 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     notes += aliasing_notes(scene.tacton, TICK / ticks)
     if pressure.profile_name == "file":
         notes.append("the map of the focus does not say its height; check HEIGHT")
-    imports, body = PACKAGES[options.package]
-    values = {
-        "HEIGHT": 1e3 * pressure.height, "DURATION": scene.tacton.duration,
-        "PATTERN_TICKS": division, "MODULATION_TICKS": ticks,
-    }  # fmt: skip
     name = scene.name.encode("unicode_escape").decode().replace('"', "'")
-    script = [
+    title = [
         f'"""{name}: {scene.tacton.duration:g} s on AUTD3 devices, by {options.package}."""',
         *(f"# {note}." for note in notes),
         "# HEIGHT is in mm above the array, DURATION in s, and MODULATION in 1/255 of full drive.",
-        imports[1:],
-        *(f"{word} = {value!r}" for word, value in values.items()),
+    ]
+    values = [
+        f"HEIGHT = {1e3 * pressure.height!r}",
+        f"DURATION = {scene.tacton.duration!r}",
+        f"PATTERN_TICKS = {division}",
+        f"MODULATION_TICKS = {ticks}",
         "PLACES = [  # mm from the centre: patterns, foci, (x, y)",
         *("    [" + ", ".join(f"[{x:.3f}, {y:.3f}]" for x, y in each) + "]," for each in places),
         "]",
         f"MODULATION = {samples.tolist() * (2 if len(samples) == 1 else 1)}",
-        body[:-1],
     ]
-    return "\n".join([*script, ""]).encode(), tuple(notes)
+    template = files("skinwave") / "templates" / f"play_{options.package}.txt"
+    script = Template(template.read_text(encoding="utf-8"))
+    text = script.substitute(title="\n".join(title), values="\n".join(values))
+    return text.encode(), tuple(notes)
 
 
 def steps(

@@ -1,12 +1,14 @@
 """Dotted keys, such as "body.layers.0.thickness_mm", in the table of a scene."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+from simple_model import Material
 from simple_model.choices import choose
 from simple_model.layers.material import PRESETS
 from skinwave.scene.keys import write_material
-from skinwave.scene.scene import solid_of
+from skinwave.scene.scene import Body, solid_of
 
 
 def value_at(node: Any, key: str) -> Any:
@@ -42,3 +44,24 @@ def with_value(node: Any, path: Sequence[str], value: Any, complete: Any = None)
     moduli = {"young_modulus_pa", "shear_modulus_pa"}
     kept = {name: x for name, x in node.items() if name == head or {name, head} != moduli}
     return kept | {head: inner}
+
+
+def materials_of(body: Body) -> dict[str, str | Material]:
+    """Return the materials of a body, its layers and its regions by dotted key."""
+    if not body.of_kind.discretise:
+        return {}
+    return (
+        {"body.material": body.material}
+        | {f"body.layers.{k}.material": layer.material for k, layer in enumerate(body.layers)}
+        | {f"body.regions.{name}": material for name, material in body.regions}
+    )
+
+
+def with_materials(body: Body, materials: Mapping[str, str | Material]) -> Body:
+    """Return the body with other materials, as in `materials_of`."""
+    layers = tuple(
+        replace(layer, material=materials[f"body.layers.{k}.material"])
+        for k, layer in enumerate(body.layers)
+    )
+    regions = tuple((name, materials[f"body.regions.{name}"]) for name, _ in body.regions)
+    return replace(body, material=materials["body.material"], layers=layers, regions=regions)

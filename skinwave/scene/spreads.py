@@ -31,11 +31,11 @@ Pressure: 160 dB at 200 mm are 59 Pa, or 28 Pa if that level is a peak value. Mo
 give 59 to 87 Pa (Liebler et al., J Acoust Soc Am 148:1713 (2020); HandyBeam; AcousTools).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 from skinwave.scene.distributions import Distribution, Spread, within_factor
-from skinwave.scene.dotted_keys import value_at
+from skinwave.scene.dotted_keys import materials_of, value_at
 from skinwave.scene.file import to_table
 from skinwave.scene.keys import SCALES
 from skinwave.scene.scene import Scene
@@ -73,17 +73,8 @@ def spreads_of(scene: Scene) -> tuple[Spread, ...]:
             Spread(key=PRESSURE, value=scene.pressure.peak_pressure,
                    distribution=within_factor(2.0), implied=True)
         )  # fmt: skip
-    if scene.body.of_kind.discretise:
-        spreads += _of_materials(scene)
+    for key, material in materials_of(scene.body).items():
+        known = OF_PRESETS.get(material, ()) if isinstance(material, str) else ()
+        spreads += [Spread(key=f"{key}.{scale}", value=1.0, distribution=given, implied=True)
+                    for scale, given in zip(SCALES, known, strict=False)]  # fmt: skip
     return tuple(each for each in spreads if not each.distribution.is_exact)
-
-
-def _of_materials(scene: Scene) -> Iterator[Spread]:
-    body = scene.body
-    named = {"body.material": body.material}
-    named |= {f"body.layers.{k}.material": layer.material for k, layer in enumerate(body.layers)}
-    named |= {f"body.regions.{name}": material for name, material in body.regions}
-    for key, material in named.items():
-        if isinstance(material, str) and (known := OF_PRESETS.get(material)):
-            for scale, given in zip(SCALES, known, strict=True):
-                yield Spread(key=f"{key}.{scale}", value=1.0, distribution=given, implied=True)

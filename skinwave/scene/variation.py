@@ -16,7 +16,7 @@ import tomli_w
 from meshes import reading
 from simple_model.choices import choose
 from skinwave.scene.distributions import Spread, parse_distribution, uniform
-from skinwave.scene.dotted_keys import with_value
+from skinwave.scene.dotted_keys import materials_of, with_materials, with_value
 from skinwave.scene.file import (
     DEEPEST,
     dumps,
@@ -29,7 +29,7 @@ from skinwave.scene.file import (
 )
 from skinwave.scene.key_hints import key_hint
 from skinwave.scene.keys import SCALES, SECTIONS
-from skinwave.scene.scene import BODIES, Body, Scene, solid_of, with_body
+from skinwave.scene.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene.spreads import PRESSURE
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
@@ -216,34 +216,20 @@ def _split_scales(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, 
 
 
 def _scale(scene: Scene, scales: Mapping[str, Any]) -> Scene:
-    """The scene with all moduli or losses multiplied by factors, one material at a time."""
-    places: dict[str, dict[str, float]] = {}
+    """The scene with all moduli or losses of materials multiplied by factors."""
+    if not scales:
+        return scene
+    materials, factors = materials_of(scene.body), dict[str, dict[str, float]]()
     for key, factor in scales.items():
         if isinstance(factor, bool) or not isinstance(factor, int | float) or not factor > 0:
             raise ValueError(f"{key} = {factor!r} must be a number above 0")
         place, _, scale = key.rpartition(".")
-        places.setdefault(place, {})[SCALES[scale]] = float(factor)
-    body = scene.body
-    for place, factors in places.items():
-        body = _with_factors(body, place, factors)
-    return replace(scene, body=body)
-
-
-def _with_factors(body: Body, place: str, factors: dict[str, float]) -> Body:
-    """The body with factors on the material at a dotted key."""
-    layers, regions = list(body.layers), dict(body.regions)
-    match place.split("."):
-        case ["body", "material"] if body.of_kind.discretise:
-            return replace(body, material=solid_of(body.material).scaled(**factors))
-        case ["body", "regions", *names] if (name := ".".join(names)) in regions:
-            regions[name] = solid_of(regions[name]).scaled(**factors)
-            return replace(body, regions=tuple(regions.items()))
-        case ["body", "layers", k, "material"] if k.isdecimal() and int(k) < len(layers):
-            layer = layers[int(k)]
-            layers[int(k)] = replace(layer, material=solid_of(layer.material).scaled(**factors))
-            return replace(body, layers=tuple(layers))
-    scale = f"{place}.{'modulus' if 'modulus' in factors else 'loss'}_scale"
-    raise ValueError(f"the scene has no material for {scale}; remove it")
+        if place not in materials:
+            raise ValueError(f"the scene has no material for {key}; remove it")
+        factors.setdefault(place, {})[SCALES[scale]] = float(factor)
+    for place, own in factors.items():
+        materials[place] = solid_of(materials[place]).scaled(**own)
+    return replace(scene, body=with_materials(scene.body, materials))
 
 
 def _check_count(count: int) -> None:
