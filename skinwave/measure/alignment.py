@@ -26,7 +26,7 @@ class Alignment:
     ----------
     delay, delay_error : s, and its standard error from noise and misfit: 0 for a given delay, nan
         if unknown or if the model does not describe the record
-    gain, gain_error : in units of the measurement per unit of the model, and the same of it
+    gain, gain_error : in units of the measurement per unit of the model, and its standard error
     repeats : s, distance to the nearest other delay that fits equally well within the noise; inf if
         the window has none
     chi_square : chi-square of the residual per degree of freedom; 1 for noise

@@ -192,9 +192,9 @@ def recording_of(arrays: Arrays, given: Given) -> Recording:
 
 
 def _beside(arrays: Arrays, name: str) -> Arrays:
-    """Return arrays by their last names: those of the same structure as one, then of others.
+    """Return arrays by their last names; those nearest to the structure of `name` win.
 
-    Arrays of several other structures are empty if they differ.
+    An array is empty if other structures have different ones of this name.
     """
 
     def closeness(other: str) -> int:

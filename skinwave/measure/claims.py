@@ -44,7 +44,10 @@ def by_name(
 
 
 def assess_measured(measured: LinesByName) -> list[MeasuredClaim]:
-    """Return all claims about such a Tacton, decided if all amplitudes in the noise agree."""
+    """Return the claims about a Tacton of this kind.
+
+    A claim is decided if all amplitudes within the noise agree.
+    """
     if not is_single(measured):
         return []
     kind = measured.is_am, measured.is_stm

@@ -211,7 +211,7 @@ def _delay_window(measurement: Measurement, run: Run, lines: MeasuredLines) -> t
 
 
 def overlap(measurement: Measurement, run: Run, delay: float) -> float:
-    """Return the time in s of a record within the Tacton, at a delay of the record."""
+    """Return the time in s that a record, at its delay, shares with the Tacton."""
     begin, end = (float(t) + delay for t in run.response.times[[0, -1]])
     return min(float(measurement.times[-1]), end) - max(float(measurement.times[0]), begin)
 
@@ -219,8 +219,8 @@ def overlap(measurement: Measurement, run: Run, delay: float) -> float:
 def at_measured_places(scene: Scene, measurement: Measurement) -> Scene:
     """Return the scene with probes at the measured places, which read displacement.
 
-    Raises a ValueError if the quantity is not normal motion, if places are unknown and differ in
-    number from the probes, or if the record resolves no line of the load.
+    Raises a ValueError if the quantity is not normal motion, if there is not one probe for each
+    unknown place, or if the record resolves no line of the load.
     """
     if not measurement.record.is_normal:
         known = ", ".join(name for name, q in QUANTITIES.items() if q.is_normal and q.of_body)

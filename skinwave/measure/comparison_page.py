@@ -168,9 +168,7 @@ def claims_table(comparison: MeasuredComparison) -> Table:
 
 
 def conclusion(comparison: MeasuredComparison, column: ModelColumn) -> str:
-    """Return whether, and where, a model agrees with the data, and what that does to gain and
-    delay.
-    """
+    """Return whether a model agrees with the data, and whether gain and delay have errors."""
     if not column.alignment.is_described:
         errors = f" {as_sentence(NOT_DESCRIBED)[:-1]}, so gain and delay have no errors."
     elif column.alignment.unexplained:

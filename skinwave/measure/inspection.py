@@ -45,9 +45,7 @@ class Inspection:
 
     @property
     def noise(self) -> Floats:
-        """Noise floor (p,) of the searched places, median over frequency, in unit/sqrt(Hz) or, for
-        spectra, the unit; nan if unknown.
-        """
+        """Median noise floor (p,) in unit/sqrt(Hz) or, for spectra, the unit; nan if unknown."""
         if self.spectrum is None:
             return np.full(len(self.kept), np.nan)
         return np.sqrt(np.median(self.spectrum.floor[LOWEST:-1], axis=0))

@@ -28,9 +28,7 @@ UNRESOLVED = 0.5  # of the unit interval, as half an interval
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """Estimate of a parameter with its 95 % interval, nan if the data do not resolve it or the
-    model does not describe them.
-    """
+    """Estimate of a parameter with its 95 % interval, whose ends are nan if it is unknown."""
 
     key: str
     value: float
@@ -47,12 +45,10 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Whiteness:
-    """Ljung and Box's test of residuals: autocorrelations (lags,), and the probability `p` that
-    those of white noise are as large.
-    """
+    """Ljung and Box's test of residuals."""
 
-    correlations: Floats
-    p: float
+    correlations: Floats  # (lags,), autocorrelations
+    p: float  # probability that those of white noise are as large
 
     @property
     def is_white(self) -> bool:
@@ -67,7 +63,7 @@ class Intervals:
 
     estimates: tuple[Estimate, ...]  # one per parameter
     half: Floats  # (k,), half widths in the unit cube
-    widenings: Floats  # (k,), factors in these for residuals that are not white, or not noise
+    widenings: Floats  # (k,), factors in `half` for residuals that are not white noise
     correlations: Floats  # (k, k) of the estimates; nan for unresolved ones
     unresolved: tuple[tuple[str, ...], ...]  # keys of unresolved directions, the worst first
     whiteness: Whiteness

@@ -26,14 +26,12 @@ MOST_LINES = 40
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpectralLine:
-    """Line with its `frequency` and standard `error` in Hz, `amplitudes` (p,) in SI, root mean
-    square over repetitions, and `false_alarm`, the probability of any such line in noise alone.
-    """
+    """A line in waveforms or spectra."""
 
-    frequency: float
-    error: float
-    amplitudes: Floats
-    false_alarm: float
+    frequency: float  # Hz
+    error: float  # Hz, standard error of the frequency
+    amplitudes: Floats  # (p,) SI, root mean square over repetitions
+    false_alarm: float  # probability of any such line in noise alone
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,8 +115,9 @@ def _densities(x: Floats, runs: int, rate: float, window: str = "hann") -> Float
 def peaks(
     density: Floats, floor: Floats, runs: int, alarm: float, known: Floats
 ) -> tuple[Floats, Floats]:
-    """Return positions (n,) in bins of new lines, strongest first, and their false-alarm
-    probabilities (n,), from densities and floors (f, p) and the positions (l,) of known lines.
+    """Return positions (n,) in bins, and false-alarm probabilities (n,), of new lines.
+
+    The strongest is first. Densities and floors are (f, p), positions of `known` lines (l,).
     """
     tests = density[LOWEST:-1].size
     chance = np.minimum(1.0, tests * false_alarm(density / floor, runs, len(density)))
@@ -169,8 +168,9 @@ def _errors(fit: _Fit, rate: float, floor: Floats, runs: int) -> Floats:
 
 
 def _fit_lines(x: Floats, start: Floats, rate: float, floor: Floats, runs: int) -> _Fit:
-    """Return lines fitted together to waveforms (t, r p), weighted by the noise floor (f, p), from
-    frequencies (l,) in Hz with an error of a fraction of a bin.
+    """Return lines fitted together to waveforms (t, r p), weighted by the noise floor (f, p).
+
+    The search begins at frequencies (l,) in Hz, known to a fraction of a bin.
     """
     largest_step = 0.5  # bins
     frequencies, limit = start.copy(), largest_step * rate / len(x)

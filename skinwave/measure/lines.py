@@ -232,7 +232,10 @@ def _select(window: Floats, waves: Floats, rows: Floats) -> Floats:
 
 
 def _of_spectra(measurement: Measurement, frequencies: Floats, settle: float) -> Estimate:
-    """Return the same from the nearest bins of spectra, with a floor if bins are equally spaced."""
+    """Return an estimate from the nearest bins of spectra.
+
+    The variance is known if the bins are equally spaced.
+    """
     axis, values = measurement.frequencies, measurement.values
     nearest = np.abs(frequencies[:, None] - axis).argmin(axis=1)
     kept = np.ones(len(axis))

@@ -1,8 +1,8 @@
 """Misfit of a model beyond the noise, and the error that it leaves in estimates.
 
-The residual of a wrong model is systematic: more samples, lines and places do not make it more
-independent. It counts as one complex value, whose two real parts estimate a variance as large along
-the slopes of the parameters as across them, with two degrees of freedom.
+The residual of a wrong model is systematic: more samples, lines or places do not average it out.
+It therefore counts as one complex value. Its two real parts estimate one variance, which is taken
+as equal along the slopes of the parameters and across them, with two degrees of freedom.
 """
 
 from math import sqrt
@@ -17,8 +17,8 @@ NOT_DESCRIBED = "the model does not describe this record"
 def beyond_noise(chi_squared: float, dof: float, freedom: float = np.inf) -> float:
     """Return the part of chi squared above its largest value from noise alone.
 
-    `freedom` are the degrees of freedom of the errors; 0 for unknown ones, whose residual is taken
-    as misfit.
+    `freedom` are the degrees of freedom of the errors. If the errors are unknown, it is 0, and the
+    whole residual is taken as misfit.
     """
     if not freedom > 0:
         return chi_squared

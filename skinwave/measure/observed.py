@@ -28,7 +28,7 @@ class LeftOutLine:
 
     name: str
     frequency: float  # Hz
-    share: float  # of the measured power of all lines without noise; nan if unresolved
+    share: float  # of the measured power of all lines, noise subtracted; nan if unresolved
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -141,7 +141,7 @@ def _not_predicted(
 
 
 def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
-    """Return complex amplitudes in two parts, or moduli with noise (Rice's distribution)."""
+    """Return real and imaginary parts of amplitudes, or moduli with noise (Rice's distribution)."""
     lines = load_lines(measured, aim)
     if lines.unresolved:
         names = first_few(lines.unresolved)

@@ -25,7 +25,7 @@ LARGEST_GAPS = 0.1  # of the samples
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Given:
-    """Information from a user. Each value replaces that in the file; None or "" does not.
+    """Information from a user. Each value replaces that in the file, unless it is None or "".
 
     Parameters
     ----------
@@ -33,8 +33,7 @@ class Given:
     unit : "mm/s", "um", "g", ...; "20 mm/s" if 1 in the file stands for 20 mm/s
     places : (p, 2) float, m
     sign : 1 if positive values are into the body, -1 if out of it
-    rate : Hz, replaces the time step of the file; the first sample remains the same number of steps
-        from 0
+    rate : Hz, replaces the time step of the file; the first sample keeps its number of steps from 0
     variable : name of the array of motion in a file with several
     columns : headings or numbers, from 1, of the columns or channels of motion
     direction : "x", "y" or "z", the direction of motion in a Universal File
@@ -131,7 +130,10 @@ def _amplitude(recording: Recording, given: Given, remarks: list[str]) -> float:
 
 
 def _check_counts(recording: Recording, given: Given, unit: str, remarks: list[str]) -> None:
-    """Raise a ValueError for counts beside a factor that is not applied; note it for others."""
+    """Raise a ValueError for whole numbers beside a factor that is not applied.
+
+    For other numbers, add a remark on the factor.
+    """
     if re.match(r"[+-]?[\d.]", given.unit.strip()):
         return
     for name, factor in recording.factors.items():

@@ -50,7 +50,7 @@ class Problem:
         return np.array(columns).T
 
     def forward_slopes(self, u: Floats) -> Floats:
-        """Return the same by one-sided differences, towards the middle, at half the cost."""
+        """Return the derivatives by one-sided differences towards the middle, at half the cost."""
         at = self.residual(u)
         forward_step = 1e-5  # of differences, in the unit interval
         steps = np.where(u < 0.5, forward_step, -forward_step)
@@ -98,9 +98,7 @@ class Solution:
 
     @property
     def scale(self) -> float:
-        """Factor of the variances: chi squared per degree of freedom, at least 1 for known errors,
-        so that a misfit of the model widens the intervals.
-        """
+        """Factor of the variances: chi squared per degree of freedom, at least 1 for known errors."""
         ratio = self.cost / self.dof
         return max(ratio, 1.0) if self.problem.data.is_known else ratio
 
@@ -160,7 +158,7 @@ def search(
 ) -> list[Start]:
     """Return the results of starts that do not fail, in order, each with candidates (c, k)."""
     results: list[Start] = []
-    minima: list[tuple[Start, Start]] = []  # each with the one that its scans lead to
+    minima: list[tuple[Start, Start]] = []  # each with the lowest one that its scans lead to
     same_minimum = 1e-3  # in the unit interval
     for n, candidates in enumerate(starts):
         progress("search from several starts", n / len(starts))

@@ -215,9 +215,7 @@ def rises(numbers: Floats) -> bool:
 
 
 def _one_time(columns: list[Column], numbers: Floats, chosen: list[int]) -> list[Column]:
-    """Return columns with a single one of times: that to the left of the chosen motion, if any.
-    Constants, such as dates, are dropped.
-    """
+    """Return columns with one of times, that beside the chosen motion, and without dates."""
     times = [k for k, column in enumerate(columns) if column.role in ("time", "frequency")]
     if len(times) < 2:
         return columns

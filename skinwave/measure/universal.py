@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from meshes import reading
+from simple_model.quantities import QUANTITIES
 from skinwave.measure.delays import align_by_references
 from skinwave.measure.recording import Given, Recording, unknown_places
 from skinwave.system import units
@@ -74,9 +75,8 @@ def recording_of(
         remarks.insert(0, "frequency responses: values are per unit of the reference")
         remarks += _driving_points(motion, given)
     unit, level = units.split_level(first.unit)
-    si = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
     if not unit and first.quantity and not given.unit:
-        unit = f"{1 / per_metre!r} {si[first.quantity]}"
+        unit = f"{1 / per_metre!r} {QUANTITIES[first.quantity].unit}"
         remarks.insert(0, f"the file gives no unit; {unit} is assumed, and --unit replaces it")
     places = unknown_places(len(nodes))
     if positions and set(nodes) <= positions.keys():
@@ -93,9 +93,7 @@ def recording_of(
 
 def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], float]:
     """Return functions, coordinates by node, and the number of units of length per metre."""
-    largest = 1_000_000_000  # bytes
-    with reading.open_regular(path, largest) as file:
-        content = file.read()
+    content = reading.read_bytes(path, 1_000_000_000)
     tag = rb"    -1(?=[\r\n]|\Z| {74})"  # line before and after each set
     tags = [match.start() for match in re.finditer(tag, content)]
     if len(tags) % 2:
@@ -266,8 +264,8 @@ def _by_node(motion: list[Function]) -> list[tuple[int, list[Function]]]:
 def _along_axis(motion: list[Function], given: Given) -> tuple[list[Function], int]:
     """Return functions along the positive axis, and the sign into the body.
 
-    It is -1 for z, and 0 for other axes. A frequency response whose excitation has a direction is
-    that along the positive axis of both, which is also that of both into the body: 1.
+    The sign is -1 for z, and 0 for other axes. If the excitation has a direction too, the response
+    along both positive axes equals that of both into the body, so the sign is 1.
     """
     at, by = ({abs(one[1]) for one in each} for each in ([f.at for f in motion],
                                                          [f.by for f in motion]))  # fmt: skip
@@ -285,7 +283,10 @@ def _along_axis(motion: list[Function], given: Given) -> tuple[list[Function], i
 
 
 def _driving_points(motion: list[Function], given: Given, least: float = 0.1) -> list[str]:
-    """Return a warning if a driving point gives more energy than a fraction of the largest."""
+    """Return warnings of driving points that give energy to the excitation.
+
+    `least` is the smallest share of the mobility that counts.
+    """
     quantity = motion[0].quantity or given.quantity or units.quantity_of(given.unit)
     warned = []
     for one in motion if quantity in units.MOTION else ():

@@ -101,8 +101,9 @@ def _loops(brushes: list[Brush], period: float, notes: list[str]) -> int:
 
 
 def _playhead(runs: Floats, count: int) -> tuple[Floats, Floats]:
-    """Return times (t,) in s at the engine's rate, including both ends, and the corresponding times
-    (t,) in s in the tracks, for runs (k, 2) played `count` times.
+    """Return times (t,) in s at the engine's rate, with both ends, and those (t,) in the tracks.
+
+    The runs (k, 2) are played `count` times.
     """
     ends = np.cumsum(np.diff(runs))
     t = np.linspace(0.0, count * ends[-1], round(count * ends[-1] * ENGINE_RATE) + 1)

@@ -78,8 +78,9 @@ def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, t
 
 
 def _change_notes(scene: Scene, content: bytes, suffix: str, most: int = 5000) -> list[str]:
-    """Return a note on the change of the load in a file that can be read back, of a CSV by its
-    first `most` samples.
+    """Return a note on the change of the load, if the file can be read back.
+
+    Of a CSV only the first `most` samples are read.
     """
     if suffix not in extensions.names(PATTERN_READERS):
         return []
@@ -100,9 +101,7 @@ def _change_notes(scene: Scene, content: bytes, suffix: str, most: int = 5000) -
 
 
 def load_change(scene: Scene, other: Scene, places: int = 16, instants: int = 4000) -> float:
-    """Return the difference in pressure of another scene on the path of a scene, relative to its
-    pressure, as root mean squares over the shorter of both.
-    """
+    """Return the relative RMS change of the pressure on the path, over the shorter Tacton."""
     golden = (5**0.5 - 1) / 2  # its multiples are spread evenly, and in step with no period
     duration = min(scene.tacton.duration, other.tacton.duration)
     times = duration * np.sort(np.arange(instants) * golden % 1)

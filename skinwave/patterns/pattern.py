@@ -19,14 +19,12 @@ STRAIGHT = 2e-5, 1e-3  # m and of full drive, tolerances of straight lines betwe
 
 @dataclass(frozen=True, kw_only=True)
 class Pattern:
-    """Contents of a file: a Tacton, the `pressure` keys that the file sets (height, drive), its
-    name, and `notes` on assumptions and changes.
-    """
+    """Contents of a file."""
 
     tacton: Tacton
-    pressure: Mapping[str, Any] = field(default_factory=dict)
+    pressure: Mapping[str, Any] = field(default_factory=dict)  # fields that it sets, as "drive"
     name: str = ""
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # on assumptions and changes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,8 +99,9 @@ def aliasing_notes(tacton: Tacton, rate: float) -> list[str]:
 
 
 def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float]:
-    """Return the key of the height: that of the options, or the common height z (k,) in m of all
-    foci; raise a ValueError if they differ.
+    """Return the height in m by its key: that of the options, or that of all foci z (k,).
+
+    Raises a ValueError if the foci differ in height.
     """
     if options.height is not None:
         return {"height": options.height}
@@ -118,8 +117,9 @@ def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float
 
 
 def thin(t: Floats, places: Floats, levels: Floats) -> np.ndarray:
-    """Return indices (k,) of samples such that straight lines between them are within `STRAIGHT` of
-    all places (t, 2) in m and levels (t,) at times (t,).
+    """Return indices (k,) of enough samples at times (t,) for straight lines between them.
+
+    These are within `STRAIGHT` of all places (t, 2) in m and levels (t,).
     """
     values = np.column_stack([places / STRAIGHT[0], levels / STRAIGHT[1]])
     kept, before = np.arange(len(t)), 0

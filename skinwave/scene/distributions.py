@@ -128,14 +128,12 @@ class Distribution:
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """An uncertain number of a scene: its dotted `key`, its central `value` in the unit of the key,
-    its distribution, and whether it is `implied` by a preset.
-    """
+    """An uncertain number of a scene."""
 
-    key: str
-    value: float
+    key: str  # dotted
+    value: float  # the central one, in the unit of the key
     distribution: Distribution
-    implied: bool = False
+    implied: bool = False  # by a preset or the device
 
     @property
     def part(self) -> str:

@@ -68,8 +68,10 @@ def loads(text: str) -> Scene:
 
 
 def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
-    """Return the table of a TOML text, with files in a folder: numbers replace the modulus files,
-    and the files of body and focus get their full path.
+    """Return the table of a TOML text.
+
+    With the folder of its files, numbers replace the modulus files, and the files of body and focus
+    get their full path.
     """
     # The time of the parser is quadratic in the parts of a key.
     keys = re.split(r"[\n#={,]", text)
@@ -104,9 +106,7 @@ def _not_toml(text: str, error: str) -> str:
 
 
 def _check_texts(table: Mapping[str, Any], depth: int = 1) -> None:
-    """Refuse tables too deep for recursion, and control characters, which result from backslashes
-    of a path in double quotes.
-    """
+    """Refuse tables too deep for recursion, and control characters, as from "C:\\new"."""
     if depth > DEEPEST:
         raise ValueError(TOO_DEEP)
     for key, value in table.items():

@@ -44,8 +44,9 @@ CONVERSIONS: tuple[tuple[str, str, str, Callable[[float], float]], ...] = (
 
 
 def key_hint(key: str, known: Iterable[str], value: Any = None) -> str:
-    """Return the end of a sentence that names the known key for another one, and the value to write
-    if it is not the given one; "" if none is near.
+    """Return the end of a sentence that names the nearest known key; "" if none is near.
+
+    It gives the value to write if that is not the given one.
     """
     known = list(known)
     for names, other, words, of in CONVERSIONS:

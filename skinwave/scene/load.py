@@ -184,8 +184,9 @@ def _facing(normals: Floats) -> Floats:
 
 
 def _pressure_tractions(load: Load, normals: Floats) -> Floats:
-    """Radiation pressure, which scales with the squared cosine of incidence: once because a sloping
-    surface spreads the beam, once because momentum is reflected along the normal.
+    """Radiation pressure, which scales with the squared cosine of incidence.
+
+    A sloping surface spreads the beam, and reflects momentum along its normal.
     """
     return (-normals * _facing(normals) ** 2)[None]
 

@@ -231,8 +231,10 @@ class Scene:
 
 
 def default_probes(body: Body) -> tuple[tuple[float, float], ...]:
-    """Return the probes in m of a scene that gives none: `PROBES`, or closer ones on a body that is
-    too narrow for them. The width of a body from a file is not known; it gets `PROBES`.
+    """Return the probes in m of a scene that gives none.
+
+    They are `PROBES`, or closer ones on a body too narrow for these. The width of a body in a file
+    is unknown here, so it gets `PROBES`.
     """
     half, furthest = body.width / 2, PROBES[-1][0]
     if not body.of_kind.is_bounded or half > furthest:

@@ -59,8 +59,7 @@ Variation = Choice | Spread
 class DesignPoint:
     """One run of a sweep: its `varied` keys and the scene, or an `error` instead.
 
-    `text` is that of the scene's file. `before` is the scene without factors on all moduli or
-    losses of a material.
+    `text` is that of the scene's file. `before` is the scene before its materials are scaled.
     """
 
     varied: Mapping[str, Any]
@@ -89,7 +88,7 @@ class DesignPoint:
 def parse(text: str) -> Variation:
     """Return the variation of `key=v1,v2`, `key=start:stop:n`, or a distribution.
 
-    A distribution is `key=start:stop`, uniform between limits, or like `key=normal(25e3,0.3)`.
+    A distribution is `key=start:stop`, uniform between limits, or such as `key=normal(25e3,0.3)`.
     """
     key, equals, right = text.partition("=")
     key = _checked_key(key.strip())
@@ -238,7 +237,7 @@ def _check_count(count: int) -> None:
 
 
 def _checked_key(key: str) -> str:
-    """The key, if scenes have it; keys inside a value, like material.poisson, are checked later."""
+    """Return a key of a scene; parts behind the second, as material.poisson, are not checked."""
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
     first = ".".join(key.split(".")[:2])
     if key != "body" and (key.count(".") > DEEPEST or first not in known):

@@ -133,7 +133,7 @@ def _named(name: str, roles: Mapping[str, str]) -> str:
 
 
 def _role(name: str, unit: str, roles: Mapping[str, str]) -> str:
-    """Return the role of a heading without a place. Where name and unit differ, the unit counts."""
+    """Return the role of a heading without a place. If name and unit differ, the unit counts."""
     dimension, quantity = dimension_of(unit), quantity_of(unit)
     by_unit = {"time": "time", "frequency": "frequency", "count": "index"}
     if dimension in by_unit:
