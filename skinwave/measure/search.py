@@ -98,7 +98,7 @@ class Solution:
 
     @property
     def scale(self) -> float:
-        """Factor of the variances: chi squared per degree of freedom, at least 1 for known errors."""
+        """Factor of the variances: chi squared per degree of freedom, >= 1 for known errors."""
         ratio = self.cost / self.dof
         return max(ratio, 1.0) if self.problem.data.is_known else ratio
 

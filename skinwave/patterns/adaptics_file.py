@@ -91,14 +91,22 @@ class _Numbers:
         """Return the number of a value: plain, from a parameter, or from a formula."""
         if not isinstance(value, dict) or "value" not in value:
             return _finite(value, name)
-        kind = value.get("type")
+        kind, inner = str(value.get("type")).lower(), value["value"]
+        if kind in ("f64", "constant"):
+            return _finite(inner, name)
+        if kind in ("param", "dynamic", "parameter"):
+            return self._parameter(inner)
         if kind == "formula":
-            return _finite(self._formula(value["value"], name), name)
-        if kind in ("param", "dynamic"):
-            return self._parameter(value["value"])
-        if kind == "f64":
-            return _finite(value["value"], name)
-        raise ValueError(f"{name} has the type {str(kind)[:40]!r}; use f64, param or formula")
+            return _finite(self(inner, name), name)
+        if kind == "negate":
+            return -self(inner, name)
+        arithmetic = {"add": add, "subtract": sub, "multiply": mul, "divide": truediv}
+        if kind not in arithmetic or not isinstance(inner, list) or len(inner) != 2:
+            raise ValueError(f"{name} has the type '{kind[:40]}'; use f64, param or formula")
+        try:
+            return float(arithmetic[kind](*(self(part, name) for part in inner)))
+        except ZeroDivisionError:
+            raise ValueError(f"{name} divides by 0; change the value of the parameter") from None
 
     def is_met(self, condition: Table) -> bool:
         """Whether the condition of a jump is met; never for a parameter without a value."""
@@ -134,24 +142,6 @@ class _Numbers:
         limit = ", the nearest value in its range" if value != given and is_given else ""
         self.notes[name] = f"{title}{source} {value:g}{limit}"
         return value
-
-    def _formula(self, formula: Any, name: str) -> float:
-        if not isinstance(formula, dict) or "value" not in formula:
-            raise ValueError(f"the formula of {name} has no type and value")
-        kind, value = str(formula.get("type")).lower(), formula["value"]
-        if kind == "constant":
-            return _finite(value, name)
-        if kind == "parameter":
-            return self._parameter(value)
-        if kind == "negate":
-            return -self._formula(value, name)
-        arithmetic = {"add": add, "subtract": sub, "multiply": mul, "divide": truediv}
-        if kind not in arithmetic or not isinstance(value, list) or len(value) != 2:
-            raise ValueError(f"the formula of {name} has the unknown type '{kind[:40]}'")
-        try:
-            return float(arithmetic[kind](*(self._formula(part, name) for part in value)))
-        except ZeroDivisionError:
-            raise ValueError(f"{name} divides by 0; change the value of the parameter") from None
 
 
 def _animation(table: Table, number: _Numbers) -> Animation:
