@@ -29,6 +29,16 @@ PathLike = str | os.PathLike[str]
 
 
 @contextmanager
+def naming(path: PathLike) -> Iterator[None]:
+    """Put the path before the message of a ValueError in one line, unless it is there."""
+    try:
+        yield
+    except ValueError as error:
+        text = " ".join(str(error).split())
+        raise ValueError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+
+
+@contextmanager
 def open_regular(path: PathLike, limit: float = np.inf) -> Iterator[BinaryIO]:
     """Open a regular file of at most `limit` bytes, or raise a ValueError."""
     binary = getattr(os, "O_BINARY", 0)
@@ -60,10 +70,8 @@ def read_bytes(path: PathLike, limit: int) -> bytes:
 def read_text(path: PathLike, must: str = "text in UTF-8") -> str:
     """Return the UTF-8 text of a file; see `decode`."""
     content = read_bytes(path, LARGEST_TEXT)
-    try:
+    with naming(path):
         return decode(content, must)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def decode(content: bytes, must: str = "text in UTF-8") -> str:

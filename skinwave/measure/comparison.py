@@ -31,7 +31,6 @@ from skinwave.results.run import ASSESSED, Run, own_names
 from skinwave.scene.scene import Scene, check_motion
 from skinwave.typing import Floats
 
-LEVEL = 0.05  # probability that any difference is declared where there is none
 AGREES, DIFFERS, NUMERICAL, NO_LINE, UNKNOWN = (
     "within the noise", "beyond the noise", "beyond the noise, within the numerical error",
     "no line above the noise", "noise unknown",
@@ -57,12 +56,13 @@ class ModelColumn:
     model: np.ndarray  # (f, p) complex, its lines with gain and delay
     p_values: Floats  # (f, p), of differences, adjusted for their number (Holm); nan if unknown
     may_be_flipped: bool = False  # whether the opposite sign fits as well
+    significance: float = 0.05  # probability that any difference is declared where there is none
 
     @property
     def differs(self) -> np.ndarray:
         """Mask (f, p) of differences beyond the noise."""
         with np.errstate(invalid="ignore"):
-            return np.asarray(self.p_values < LEVEL)
+            return np.asarray(self.p_values < self.significance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,7 +108,7 @@ class MeasuredComparison:
     def findings(self, column: ModelColumn) -> np.ndarray:
         """Return one of `AGREES` to `UNKNOWN` (f, p) for each difference."""
         with np.errstate(invalid="ignore"):
-            is_noise = self.present >= LEVEL
+            is_noise = self.present >= column.significance
         findings = np.where(is_noise, NO_LINE, AGREES).astype(object)
         findings[column.differs] = DIFFERS
         findings[column.differs & self.is_numerical(column)] = NUMERICAL

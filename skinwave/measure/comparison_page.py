@@ -20,7 +20,7 @@ from simple_model.numbers import (
 )
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.claims import FAILS, HOLDS
-from skinwave.measure.comparison import LEVEL, UNKNOWN, MeasuredComparison, ModelColumn, overlap
+from skinwave.measure.comparison import UNKNOWN, MeasuredComparison, ModelColumn, overlap
 from skinwave.measure.inspection import flaws, unsteady
 from skinwave.measure.misfit import LARGEST_MISFIT, NOT_DESCRIBED
 from skinwave.report.palette import label
@@ -69,8 +69,8 @@ def page_section(
         "follow from all lines and places, weighted by noise. Their standard errors contain "
         f"noise and a misfit beyond it; with a misfit above {percent(LARGEST_MISFIT)} there are "
         "none. A difference is beyond the noise if its p-value, adjusted for the number of lines "
-        f"and places (Holm), is below {100 * LEVEL:g} % (Victor & Mast 1991). The point kernels "
-        "are pressures, and their gain has that unit."
+        f"and places (Holm), is below {100 * main.significance:g} % (Victor & Mast 1991). The "
+        "point kernels are pressures, and their gain has that unit."
     )
     return Section("Comparison with the measurement", [
         *(conclusion(comparison, column) for column in comparison.bodies),
@@ -189,7 +189,7 @@ def _agreement(comparison: MeasuredComparison, column: ModelColumn) -> str:
         )
     misfit += f"; noise alone leaves {percent(comparison.noise)}."
     if not differs.any():
-        around = lines.radius(1 - LEVEL / lines.variance.size)
+        around = lines.radius(1 - column.significance / lines.variance.size)
         least = float(np.nanmedian(around) / np.abs(lines.mean).max())
         return (
             f"The {name} agrees with the data within the noise, for all {known} pairs of line and "

@@ -16,6 +16,7 @@ from skinwave.measure.parameters import DELAY
 def sentences(result: Fit) -> list[str]:
     """Return sentences on the fitted keys and the quality of the fit."""
     solution, data = result.solution, result.solution.problem.data
+    misfit = share_of(result.intervals.misfit, "the measured motion")
     ratio = significant(solution.cost / solution.dof)
     known = f"; chi squared over its degrees of freedom is {ratio}, with known errors"
     none = f" {as_sentence(NOT_DESCRIBED)[:-1]}, so no estimate has an interval."
@@ -23,7 +24,7 @@ def sentences(result: Fit) -> list[str]:
         f"{result.target.model} was fitted to {data.words}.",
         f"{solution.agreeing_starts} of {plural(len(solution.starts), 'start')} reached the "
         "solution.",
-        f"The residual is {share_of(result.misfit, 'the measured motion')}{known * data.is_known}."
+        f"The residual is {misfit}{known * data.is_known}."
         f"{none * (not result.intervals.is_described)}",
         *(
             "{} = {}, 95 % interval {} to {}.".format(each.key, *round_to_interval(each))

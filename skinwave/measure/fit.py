@@ -9,7 +9,7 @@ from scipy.special import ndtri
 
 from simple_model.choices import choose
 from skinwave.bodies.parts import solid_of
-from skinwave.measure.intervals import LEVEL, Estimate, Intervals, intervals
+from skinwave.measure.intervals import CONFIDENCE, Estimate, Intervals, intervals
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.observed import KINDS, data_of
 from skinwave.measure.parameters import Parameter, check_limits, of_scene, parse
@@ -69,11 +69,6 @@ class Fit:
         """Prediction (n, s) at the solution."""
         return self.solution.problem.predict(self.solution.u)
 
-    @property
-    def misfit(self) -> float:
-        """Relative L2 norm of the unweighted residual."""
-        return self.intervals.misfit
-
 
 def fit(
     scene: Scene,
@@ -124,7 +119,7 @@ def _distribution(limits: Parameter, estimate: Estimate, half: float) -> Distrib
     """Return the distribution of an estimate; `half` is half its interval, of the unit interval."""
     if not estimate.is_resolved or estimate.at_limit:
         return Distribution(shape="uniform", measure="bounds", width=(limits.low, limits.high))
-    deviation = half * limits.span / float(ndtri((1 + LEVEL) / 2))
+    deviation = half * limits.span / float(ndtri((1 + CONFIDENCE) / 2))
     shape = "lognormal" if limits.is_log else "normal"
     error = estimate.value * sqrt(expm1(deviation**2)) if limits.is_log else deviation
     return Distribution(shape=shape, measure="standard_error", width=(error,))

@@ -151,7 +151,7 @@ def summary(result: Fit) -> dict[str, Any]:
         "unresolved": [list(keys) for keys in result.intervals.unresolved],
         "chi_squared": solution.cost,
         "degrees_of_freedom": solution.dof,
-        "misfit": result.misfit,
+        "misfit": result.intervals.misfit,
         "misfit_beyond_noise": result.intervals.unexplained,
         "whiteness_p": _finite(result.intervals.whiteness.p),
         "widened": dict(zip(keys, result.intervals.widenings.tolist(), strict=True)),

@@ -11,7 +11,7 @@ from simple_model.numbers import percent
 from simple_model.response import SETTLE, fit_lines
 from skinwave.measure.line_search import (
     ALARM,
-    FEWEST,
+    FEWEST_SAMPLES,
     LOWEST,
     LineSpectrum,
     SpectralLine,
@@ -78,7 +78,7 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
     spectrum = None
     if len(kept) and measured.is_spectrum:
         spectrum = _of_amplitudes(measured, kept, alarm)
-    elif len(kept) and part.stop - part.start >= FEWEST:
+    elif len(kept) and part.stop - part.start >= FEWEST_SAMPLES:
         spectrum = find_lines(measured.values[:, part, kept], measured.rate, alarm=alarm)
     if not measured.is_spectrum and spectrum and spectrum.lines:
         searched = replace(

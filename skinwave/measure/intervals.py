@@ -22,8 +22,8 @@ from skinwave.measure.misfit import LARGEST_MISFIT, beyond_noise, systematic, un
 from skinwave.measure.search import Solution
 from skinwave.typing import Floats
 
-LEVEL = 0.95
-UNRESOLVED = 0.5  # of the unit interval, as half an interval
+CONFIDENCE = 0.95
+WIDEST = 0.5  # of the unit interval, as half an interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +87,7 @@ def intervals(solution: Solution) -> Intervals:
     error = np.sqrt(np.diag(covariance))
     test = whiteness(solution.residual)
     dof = np.inf if solution.problem.data.is_known else solution.dof
-    width = float(t.ppf((1 + LEVEL) / 2, dof))
+    width = float(t.ppf((1 + CONFIDENCE) / 2, dof))
     widenings, across = np.ones(len(moves)), np.ones(len(moves))
     if not test.is_white:
         widenings, across = (
@@ -101,7 +101,7 @@ def intervals(solution: Solution) -> Intervals:
     misfit = float(away) / max(float(np.linalg.norm(data.values)), 1e-300)
     widenings = np.hypot(widenings, systematic(beyond / scale) / width)
     half = width * widenings * error
-    hidden = half >= UNRESOLVED
+    hidden = half >= WIDEST
     correlations = covariance / np.outer(error, error)
     directions = np.abs(vt[singular < 2 * width * across][::-1])
     keys = solution.problem.parameters.keys
@@ -131,7 +131,7 @@ def _estimate(solution: Solution, k: int, to_end: Floats, away: float) -> Estima
     parameter, u, half = solution.problem.parameters.free[k], float(solution.u[k]), float(to_end[k])
     low, high, is_curved = np.nan, np.nan, False
     curved = 0.3  # relative difference of the root of chi squared from that of a linear model
-    if half < UNRESOLVED:
+    if half < WIDEST:
         low, high = max(u - half, 0.0), min(u + half, 1.0)
         ends = (solution.u - to_end, solution.u + to_end)
         is_curved = any(

@@ -20,7 +20,7 @@ from skinwave.typing import Floats
 
 ALARM = 0.01  # probability that a file of noise has any line
 LOWEST = 4  # bins; slower motion is drift, and lines as close to half the rate are undetermined
-FEWEST = 32  # samples
+FEWEST_SAMPLES = 32  # samples
 MOST_LINES = 40
 
 
@@ -66,8 +66,10 @@ def find_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> LineSpec
     samples.
     """
     runs, count, places = values.shape
-    if count < FEWEST:
-        raise ValueError(f"{count} samples are too few for a spectrum; measure {FEWEST} or more")
+    if count < FEWEST_SAMPLES:
+        raise ValueError(
+            f"{count} samples are too few for a spectrum; measure {FEWEST_SAMPLES} or more"
+        )
     x = np.moveaxis(values, 0, 1).reshape(count, runs * places)
     round_off = 1e-9  # of the largest value; weaker lines are round-off
     least = 2 / rate * (round_off * np.abs(values).max()) ** 2

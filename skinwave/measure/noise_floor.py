@@ -8,7 +8,7 @@ from scipy.special import fdtrc, gammaincinv, gammaln
 
 from skinwave.typing import Floats
 
-FEWEST = 10  # bins of the band of the median
+FEWEST_BINS = 10  # bins of the band of the median
 CORRELATED = 1 + 2 * (0.28 + 0.016)  # bins under a Hann window per independent bin of a median
 
 
@@ -54,21 +54,21 @@ def false_alarm(ratio: Floats, runs: int, bins: int) -> Floats:
 def _noise_bins(kept: Floats) -> np.ndarray:
     """Return the bins with enough remaining noise: at least half of those around any bin."""
     least_kept = 0.5  # share of the noise that a bin next to lines must have left
-    least = np.minimum(least_kept, median_filter(kept, 2 * FEWEST + 1))
+    least = np.minimum(least_kept, median_filter(kept, 2 * FEWEST_BINS + 1))
     return 1 + np.flatnonzero((kept[1:] >= least[1:]) & (kept[1:] > 0))
 
 
 def _bands(knots: np.ndarray, bins: np.ndarray) -> np.ndarray:
-    """Return ranges (k, 2) of bins around knots, the last plus one, at least `FEWEST` bins."""
+    """Return ranges (k, 2) of bins around knots, the last plus one, at least `FEWEST_BINS` bins."""
     h = _half_width(knots)
     low, high = (np.searchsorted(bins, edge) for edge in (knots - h, knots + h + 1))
-    missing = np.maximum(FEWEST - (high - low), 0)
+    missing = np.maximum(FEWEST_BINS - (high - low), 0)
     return np.column_stack([np.maximum(low - missing, 0), np.minimum(high + missing, len(bins))])
 
 
 def _half_width(k: np.ndarray) -> np.ndarray:
     half_band, widest = 0.25, 400  # half-width of the band over the frequency; bins
-    return np.clip(half_band * k, FEWEST, widest).astype(int)
+    return np.clip(half_band * k, FEWEST_BINS, widest).astype(int)
 
 
 def _knots(bins: int) -> np.ndarray:
@@ -86,7 +86,7 @@ def _trend(bins: np.ndarray, density: Floats, count: int) -> Floats:
     bands = [band for band in pairwise(np.searchsorted(bins, edges).tolist()) if band[1] > band[0]]
     x = np.array([np.log(bins[low:high].mean()) for low, high in bands])
     y = np.array([np.log(np.median(density[low:high], axis=0)) for low, high in bands])
-    weight = np.sqrt([[min(high - low, FEWEST)] for low, high in bands])
+    weight = np.sqrt([[min(high - low, FEWEST_BINS)] for low, high in bands])
     basis = np.vander(x, min(3, len(x)), increasing=True)
     coefficients = np.linalg.lstsq(basis * weight, y * weight, rcond=None)[0]
     k = np.log(np.maximum(np.arange(count), 2.0))

@@ -103,11 +103,8 @@ def read(path: str | Path, **options: Any) -> Measurement:
         if getattr(given, option) and option not in reader.choices:
             raise ValueError(f"{path}: --{option} has no effect on {reader.name} files")
     try:
-        return complete(reader.function(path, given), given, path)
-    except ValueError as error:
-        message = " ".join(str(error).split())
-        prefix = "" if message.startswith(str(path)) else f"{path}: "
-        raise ValueError(prefix + message) from None
+        with reading.naming(path):
+            return complete(reader.function(path, given), given, path)
     except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
         raise ValueError(f"{path}: not a valid {reader.name} file; export it again") from error
 

@@ -64,12 +64,11 @@ class Problem:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Start:
-    """A local search from `begun` (k,) to `ended` (k,), with chi squared there."""
+class LocalMinimum:
+    """End of a local search."""
 
-    begun: Floats
-    ended: Floats
-    cost: float
+    ended: Floats  # (k,)
+    cost: float  # chi squared
     converged: bool
 
 
@@ -81,7 +80,7 @@ class Solution:
     u: Floats  # (k,), the best point of the unit cube
     residual: Floats  # (n, s), weighted
     slopes: Floats  # (n s, k), derivatives of the residual
-    starts: tuple[Start, ...]  # the best first
+    starts: tuple[LocalMinimum, ...]  # the best first
     failures: Mapping[str, str]  # reasons of other starts
     may_be_flipped: bool  # whether the opposite sign of the measurement fits as well
     converged: bool
@@ -138,7 +137,7 @@ def minimise(problem: Problem, starts: int, seed: int, progress: Progress) -> So
     )  # fmt: skip
 
 
-def _may_be_flipped(problem: Problem, best: Start, candidates: Floats) -> bool:
+def _may_be_flipped(problem: Problem, best: LocalMinimum, candidates: Floats) -> bool:
     """Whether the opposite sign of the measurement fits better, or with a smaller delay."""
     data, parameters = problem.data, problem.parameters
     linear = [each for each in parameters.free if each.key in problem.linear]
@@ -155,10 +154,12 @@ def _may_be_flipped(problem: Problem, best: Start, candidates: Floats) -> bool:
 
 def search(
     problem: Problem, starts: Sequence[Floats], progress: Progress, failures: dict[str, str]
-) -> list[Start]:
+) -> list[LocalMinimum]:
     """Return the results of starts that do not fail, in order, each with candidates (c, k)."""
-    results: list[Start] = []
-    minima: list[tuple[Start, Start]] = []  # each with the lowest one that its scans lead to
+    results: list[LocalMinimum] = []
+    minima: list[
+        tuple[LocalMinimum, LocalMinimum]
+    ] = []  # each with the lowest one that its scans lead to
     same_minimum = 1e-3  # in the unit interval
     for n, candidates in enumerate(starts):
         progress("search from several starts", n / len(starts))
@@ -170,11 +171,11 @@ def search(
             if lowest is None:
                 lowest = descend(problem, local)
                 minima.append((local, lowest))
-            results.append(replace(lowest, begun=local.begun))
+            results.append(lowest)
     return results
 
 
-def descend(problem: Problem, local: Start) -> Start:
+def descend(problem: Problem, local: LocalMinimum) -> LocalMinimum:
     """Return the lowest minimum that scans of one parameter after another lead to."""
     most_hops = 5  # from one minimum to a lower one
     for _ in range(most_hops):
@@ -185,7 +186,7 @@ def descend(problem: Problem, local: Start) -> Start:
     return local
 
 
-def _lower(problem: Problem, local: Start) -> Start | None:
+def _lower(problem: Problem, local: LocalMinimum) -> LocalMinimum | None:
     """Return a lower minimum near a minimum of a scan, if there is any."""
     short_search = 8  # evaluations that show whether a minimum of a scan leads lower
     least_gain = 1e-4  # of chi squared, of a lower minimum
@@ -199,7 +200,7 @@ def _lower(problem: Problem, local: Start) -> Start | None:
     return None
 
 
-def _scan_minima(problem: Problem, local: Start, k: int) -> list[Floats]:
+def _scan_minima(problem: Problem, local: LocalMinimum, k: int) -> list[Floats]:
     """Return the minima (k,) along a parameter through the end of a local search."""
     free, u = problem.parameters.free[k], local.ended
     scan_ratio = 1.25  # of neighbouring values in a scan of a logarithm
@@ -214,14 +215,14 @@ def _scan_minima(problem: Problem, local: Start, k: int) -> list[Floats]:
     return [scan[n][1] for n in sorted(new, key=lambda n: scan[n][0])]
 
 
-def refine(problem: Problem, u: Floats, most: int = 40, tolerance: float = 1e-5) -> Start:
+def refine(problem: Problem, u: Floats, most: int = 40, tolerance: float = 1e-5) -> LocalMinimum:
     """Search locally from a point (k,) to a relative tolerance of chi squared."""
     result = least_squares(
         problem.residual, np.clip(u, 1e-6, 1 - 1e-6), problem.forward_slopes, bounds=(0, 1),
         x_scale="jac", xtol=1e-8, ftol=tolerance, gtol=1e-8, max_nfev=most,
     )  # fmt: skip
     cost = 2 * float(result.cost)
-    return Start(begun=u, ended=result.x, cost=cost, converged=result.status > 0)
+    return LocalMinimum(ended=result.x, cost=cost, converged=result.status > 0)
 
 
 def best_candidate(problem: Problem, candidates: Floats) -> Floats:

@@ -58,14 +58,12 @@ def read_pattern(
     receiver = base or scene_file.loads("")
     source = format_of(PATTERN_READERS, path)
     content = reading.read_bytes(path, source.largest)
-    try:
+    with reading.naming(path):
         pattern = source.function(content, options, receiver)
         tacton = resize(pattern.tacton, options.resize)
         notes = list(pattern.notes)
         receiver = base or wide_enough(receiver, tacton, notes)
         return onto(receiver, replace(pattern, tacton=tacton), path.stem), tuple(notes)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, tuple[str, ...]]:

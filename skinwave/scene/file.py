@@ -50,10 +50,8 @@ def read(path: str | Path) -> Scene:
     """
     must = "a scene, TOML text of keys such as size_mm = 20 below a header such as [tacton]"
     text = reading.read_text(path, must=must)
-    try:
+    with reading.naming(path):
         return from_table({"name": Path(path).stem} | parse_toml(text, Path(path).parent))
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def loads(text: str) -> Scene:

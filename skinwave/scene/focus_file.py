@@ -54,11 +54,8 @@ def read_spot(path: str | Path, unit: str = "", *, needs_peak: bool = False) -> 
     path = Path(path)
     with reading.open_regular(path) as file:
         written = os.fstat(file.fileno())
-    try:
+    with reading.naming(path):
         return _read_spot(path, written.st_mtime_ns, written.st_size, unit, needs_peak)
-    except ValueError as error:
-        said = str(error)
-        raise ValueError(said if said.startswith(str(path)) else f"{path}: {said}") from None
 
 
 @lru_cache(maxsize=4)  # the scenes of a sweep read the same file

@@ -117,10 +117,8 @@ def with_tables(scene: dict[str, Any], folder: Path) -> dict[str, Any]:
     for material in _materials(scene):
         if isinstance(name := material.get("table"), str):
             text = reading.read_text(folder / name)
-            try:
+            with reading.naming(folder / name):
                 material["table"] = modulus_columns(modulus_table(text))
-            except ValueError as error:
-                raise ValueError(f"{folder / name}: {error}") from None
     return scene
 
 

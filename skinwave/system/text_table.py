@@ -290,11 +290,12 @@ def _numbers(
 ) -> Floats:
     """Return the numbers (n, c) from line `first` on; other cells are added to the notes."""
     width, delimiter = len(names), layout.delimiter
-    rows = ["" if line[:1] in ("#", "%") else line for line in lines[first:]]
+    rows = [(k, line) for k, line in enumerate(lines[first:], first + 1)
+            if not line.startswith(("#", "%"))]  # fmt: skip
     leading_zero = re.compile(r",0\d+(?=,|$)")
-    if delimiter == "," and any(map(leading_zero.search, rows[:SAMPLE_ROWS])):
+    if delimiter == "," and any(leading_zero.search(line) for _, line in rows[:SAMPLE_ROWS]):
         raise ValueError(f"line {first + 1} has decimal commas between commas; use semicolons")
-    text = "\n".join(rows)
+    text = "\n".join(line for _, line in rows)
     if len(layout.numeric) == width > 1 and not (layout.has_commas and "." in text):
         with suppress(ValueError):  # ten times faster, if all cells are plain numbers
             table = np.loadtxt(
@@ -303,10 +304,9 @@ def _numbers(
             )  # fmt: skip
             if table.shape[1] == width:
                 return table
-    return np.array([
-        _row(line, k, layout, names, notes)
-        for k, line in enumerate(rows, first + 1) if line.strip() or width == 1
-    ])  # fmt: skip
+    return np.array(
+        [_row(line, k, layout, names, notes) for k, line in rows if line.strip() or width == 1]
+    )
 
 
 def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes) -> list[complex]:

@@ -145,7 +145,7 @@ loss_factor = 0.2
     assert of["gain"].low < 0.8 < of["gain"].high
     assert of["delay_ms"].low < 0.7 < of["delay_ms"].high
     assert any(text.startswith("the misfit beyond the noise") for text in cautions(wide))
-    assert none.misfit > 0.2
+    assert none.intervals.misfit > 0.2
     found = summary(none)
     assert not any(each["resolved"] or each["low"] for each in found["estimates"])
     assert NOT_DESCRIBED[1:] in found["sentences"][2]
@@ -300,7 +300,7 @@ def test_a_start_that_fails_leaves_the_others(monkeypatch):
     def refined(problem, start):
         if start:
             raise ArithmeticError("not finite")
-        return search.Start(begun=np.zeros(1), ended=np.zeros(1), cost=0.0, converged=True)
+        return search.LocalMinimum(ended=np.zeros(1), cost=0.0, converged=True)
 
     monkeypatch.setattr(search, "best_candidate", lambda problem, candidates: candidates)
     monkeypatch.setattr(search, "refine", refined)

@@ -17,6 +17,7 @@ TEXTS = {
     HEAD + ROWS + "0.003, x, 8\n": "line 5 has 'x'",
     "t [s]; v(0,0) [nm/s]\n0,001; 594\n0,002; 1.357\n": "1.357",
     HEAD + ROWS + "0.003, 7\n": "line 5",
+    HEAD + ROWS + "0.003, 7+1i, 8\n": "complex numbers",
     HEAD + ROWS + "0.007, 1, 1\n": "rows are missing",
     HEAD + "0, 1, 2\n-0.001, 3, 4\n": "must rise",
     HEAD.replace("mm/s", "dB") + ROWS: "'dB' is a level",

@@ -25,7 +25,7 @@ HEADERS = (
     "t [s] v(0,0) [mm/s] v(5,0) [mm/s]\n0 1.5 2\n0.5 3 4\n",
     "Time (s);Left (mm/s);Right (mm/s)\n0,0;1,5;2\n0,5;3;4\n",
     '# note\n"t [s]","v(0,0) [m/s]","v(5,0) [m/s]"\n"0","0.0015","0.002"\n0.5,0.003,"0.004"\n',
-    "t_ms,velocity_mm_s,velocity_mm_s\n0,1.5,2\n500,3,4\n",
+    "t_ms,velocity_mm_s,velocity_mm_s\n0,1.5,2\n# a pause\n500,3,4\n",
     "t [s],x [mm],y [mm],v [mm/s]\n0,0,0,1.5\n0.5,0,0,3\n0.5,5,0,4\n0,5,0,2\n",
 )
 

@@ -2,6 +2,7 @@
 
 import re
 import struct
+from dataclasses import replace
 
 import measurement_files as files
 import numpy as np
@@ -12,6 +13,7 @@ from test_tables import COUNT, RATE, TONE, T, assert_tone, rows
 
 from skinwave.measure.lines import lines_of
 from skinwave.measure.reading import read
+from skinwave.system.headings import parse_heading
 from skinwave.system.units import motion_divisor, quantity_of, split_level
 
 F = np.arange(100.0, 200.0, 5.0)
@@ -99,6 +101,9 @@ def test_units_of_inches_and_their_levels():
     ):  # fmt: skip
         assert quantity_of(unit) == quantity, unit
         assert motion_divisor(unit, quantity) == pytest.approx(per, rel=1e-14), unit
+    assert parse_heading("Re(v) [mm/s]") == replace(
+        parse_heading("re v [mm/s]"), text="Re v [mm/s]"
+    )
     for text in ("Phase [deg]", "speed [mm/s]", "upper [um]", "Temps [s]", "coeff", "palm p 3"):
         assert split_level(text) == (text, "")
 

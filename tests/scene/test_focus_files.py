@@ -56,6 +56,9 @@ WRITERS = {
         "% Model: array\n" + table("% x (mm)   y (mm)   Re(p) (Pa)   Im(p) (Pa)",
         2**0.5 * RMS * PHASE.real, 2**0.5 * RMS * PHASE.imag, separator="   ")
     ),
+    "complex.csv": lambda path: path.write_text("\n".join(["x [mm],y [mm],p (Pa)", *(
+        f"{x},{y},{z.real:.9g}{z.imag:+.9g}i"
+        for x, y, z in zip(X.flat, Y.flat, (2**0.5 * RMS * PHASE).flat, strict=True))])),
     "level.tsv": lambda path: path.write_text(
         table("x_mm\ty_mm\tspl [dB re 20 µPa]", 20 * np.log10(RMS / 20e-6), separator="\t")
     ),
