@@ -4,6 +4,7 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import label
 
 from simple_model import MovingPressure
 from simple_model.load.line_names import line_names
@@ -228,8 +229,7 @@ def _clipped_samples(measured: Measurement) -> np.ndarray:
 def _cut_off(x: Floats) -> int:
     top = x.max()
     at_top = x == top
-    edges = np.diff(np.r_[False, at_top, False].astype(int))
-    lengths = np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)
+    lengths = np.bincount(label(at_top)[0])[1:]
     run, fewest_runs = 3, 2  # clipped samples in a row at an extreme, and how many such runs,
     long_run = 20  # or one run
     if (lengths >= run).sum() < fewest_runs and lengths.max() < long_run:
