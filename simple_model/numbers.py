@@ -89,6 +89,11 @@ def plural(number: int, thing: str) -> str:
     return f"{number:,} {thing}{'s' * (number != 1)}"
 
 
+def if_finite(value: float) -> float | None:
+    """Return a number for JSON: None if it is not finite."""
+    return float(value) if isfinite(value) else None
+
+
 def first_few(names: Sequence[str], most: int = 3) -> str:
     """Format a list of names, of which at most a few are given.
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from math import hypot, inf, isfinite
 from typing import Any
 
-from simple_model.numbers import change_text, percent, stated_error
+from simple_model.numbers import change_text, if_finite, percent, stated_error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +83,8 @@ class Statement:
     def summary(self) -> dict[str, Any]:
         """Return `expected_error` and its parts, `errors`, for JSON; an unknown error is None."""
         return {
-            "expected_error": _finite_or_none(self.error),
-            "errors": [asdict(p) | {"error": _finite_or_none(p.error)} for p in self.parts],
+            "expected_error": if_finite(self.error),
+            "errors": [asdict(part) | {"error": if_finite(part.error)} for part in self.parts],
         }
 
     def columns(self) -> dict[str, Any]:
@@ -104,7 +104,3 @@ class Statement:
             for part in errors
         )
         return Statement(parts=tuple(parts))
-
-
-def _finite_or_none(error: float) -> float | None:
-    return error if isfinite(error) else None

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model import Effort
-from simple_model.numbers import significant
+from simple_model.numbers import if_finite, significant
 from skinwave.measure.findings import cautions, notes, probability, round_to_interval, sentences
 from skinwave.measure.fit import Fit
 from skinwave.measure.intervals import Estimate
@@ -153,10 +153,10 @@ def summary(result: Fit) -> dict[str, Any]:
         "degrees_of_freedom": solution.dof,
         "misfit": result.intervals.misfit,
         "misfit_beyond_noise": result.intervals.unexplained,
-        "whiteness_p": _finite(result.intervals.whiteness.p),
+        "whiteness_p": if_finite(result.intervals.whiteness.p),
         "widened": dict(zip(keys, result.intervals.widenings.tolist(), strict=True)),
         "left_out": [
-            {"line": line.name, "frequency_hz": line.frequency, "share": _finite(line.share)}
+            {"line": line.name, "frequency_hz": line.frequency, "share": if_finite(line.share)}
             for line in data.left_out
         ],
         "may_be_turned": solution.may_be_flipped,
@@ -166,10 +166,6 @@ def summary(result: Fit) -> dict[str, Any]:
         "sentences": sentences(result),
         "warnings": cautions(result),
     }  # fmt: skip
-
-
-def _finite(value: float) -> float | None:
-    return value if isfinite(value) else None
 
 
 @mpl.rc_context(REPORT.rc)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from simple_model.numbers import as_sentence, interval, plural, significant
+from simple_model.numbers import as_sentence, if_finite, interval, plural, significant
 from simple_model.response import SETTLE
 from skinwave.measure import writing
 from skinwave.measure.inspection import Inspection
@@ -138,23 +138,20 @@ def summary(inspection: Inspection) -> dict[str, Any]:
     return {
         "name": measured.name, "source": measured.source, "quantity": measured.quantity,
         "unit": measured.record.unit, "repetitions": len(measured.values),
-        "places_m": [_known_rows(place) for place in measured.places],
+        "places_m": [[*map(if_finite, place)] for place in measured.places],
         "samples": len(measured.axis), "is_spectrum": measured.is_spectrum,
-        "rate_hz": _known_rows([measured.rate])[0], "has_drive": len(measured.drive) > 0,
+        "rate_hz": if_finite(measured.rate), "has_drive": len(measured.drive) > 0,
         "lines": [
             {"frequency_hz": line.frequency, "frequency_error_hz": line.error,
              "false_alarm": line.false_alarm, "what": origin,
              "amplitudes": line.amplitudes.tolist()}
             for line, origin in zip(inspection.lines, inspection.origins, strict=True)
         ],
-        "looked_at": (inspection.kept + 1).tolist(), "noise_floor": _known_rows(inspection.noise),
+        "looked_at": (inspection.kept + 1).tolist(),
+        "noise_floor": [*map(if_finite, inspection.noise)],
         "clipped_samples": inspection.clipped.tolist(),
         "constant_places": (inspection.constant + 1).tolist(), "missing": list(inspection.missing),
     }  # fmt: skip
-
-
-def _known_rows(values: Any) -> list[float | None]:
-    return [None if np.isnan(x) else float(x) for x in values]
 
 
 @mpl.rc_context(REPORT.rc)

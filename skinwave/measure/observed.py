@@ -201,9 +201,16 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
     rough = _of_lines("lines", measured, aim) if lines.names and not lines.unresolved else None
     if rough and is_steady(measured, frequencies):
         rest = fit_lines(as_response(measured), frequencies)[1]
+        predict_lines = predicted_lines(aim, frequencies)
+        waves = np.exp(2j * pi * measured.times[:, None] * frequencies)
+
+        def predict_steady(values: Mapping[str, float]) -> Floats:
+            x = (waves @ predict_lines(values)).real
+            return np.asarray(x - x.mean(axis=0))
+
         data = _in_time(
-            measured, mean - mean.mean(axis=0), _sum_of_lines(measured, aim, frequencies),
-            rest.std(axis=0), f"steady waveforms about their mean, as {lines.words}", rough,
+            measured, mean - mean.mean(axis=0), predict_steady, rest.std(axis=0),
+            f"steady waveforms about their mean, as {lines.words}", rough,
         )  # fmt: skip
         return replace(data, lines=lines.names, left_out=lines.left_out)
     if aim.record.is_steady:
@@ -228,18 +235,6 @@ def is_steady(measured: Measurement, frequencies: Floats) -> bool:
     steady = 1.5  # largest residual of the start of a steady record, relative to the rest
     negligible_transient = 1e-3  # of the largest motion
     return bool(start <= max(steady * later, negligible_transient * largest))
-
-
-def _sum_of_lines(measured: Measurement, aim: Target, frequencies: Floats) -> Predict:
-    """Return the prediction of steady waveforms (t, p) about their mean."""
-    predict = predicted_lines(aim, frequencies)
-    waves = np.exp(2j * pi * measured.times[:, None] * frequencies)
-
-    def synthesised(values: Mapping[str, float]) -> Floats:
-        x = (waves @ predict(values)).real
-        return np.asarray(x - x.mean(axis=0))
-
-    return synthesised
 
 
 def _in_time(

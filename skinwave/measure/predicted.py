@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import pi
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -81,10 +80,10 @@ class Target:
         relative = values[key] / strength if self._is_scaled(values) else 1.0
         return float(values.get(GAIN, 1.0) * relative)
 
-    def rest(self, values: Values) -> dict[str, float]:
-        """Return the values of all keys except the delay and the linear keys."""
+    def rest(self, values: Values) -> tuple[tuple[str, float], ...]:
+        """Return keys and values, sorted, without the delay and the linear keys."""
         left_out = {GAIN, DELAY} | ({self.strength[0]} if self._is_scaled(values) else set())
-        return {key: value for key, value in values.items() if key not in left_out}
+        return tuple(sorted(item for item in values.items() if item[0] not in left_out))
 
     def predicts(self, frequencies: Floats) -> np.ndarray:
         """Return a mask (f,) of the lines that are predicted; a reduced body omits weak ones."""
@@ -113,7 +112,7 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
 def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> Target:
     """Return the target, with a shared reduction of its body if one covers all ranges."""
     ranges = {each.key: (each.low, each.high) for each in parameters.free}
-    ranges = {key: ranges[key] for key in aim.rest(dict.fromkeys(ranges, 1.0))}
+    ranges = {key: ranges[key] for key, _ in aim.rest(dict.fromkeys(ranges, 1.0))}
     if not aim.record.is_reduced or parameters.ties or not ranges:
         return aim
     expected_runs = 200  # of a fit
@@ -127,7 +126,9 @@ def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
     i f t) at frequencies (f,) in Hz. It raises a ValueError if the load has no line at one of them.
     """
 
-    def unscaled(values: Values) -> Complex:
+    @lru_cache(maxsize=32)
+    def unscaled(items: tuple[tuple[str, float], ...]) -> Complex:
+        values = dict(items)
         if aim.reduced:
             f, a = parametric.lines(aim.reduced, values)
             return np.asarray(a[np.abs(f[:, None] - frequencies).argmin(axis=0)])
@@ -135,11 +136,9 @@ def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
             return _flat_lines(aim, values, frequencies)
         return np.asarray(fit_lines(compute(aim.scene_with(values), aim.model), frequencies)[0])
 
-    base = _from_cache(unscaled)
-
     def predict(values: Values) -> Complex:
         late = np.exp(-2j * pi * frequencies * values.get(DELAY, 0.0) / 1e3)
-        return aim.factor(values) * late[:, None] * base(aim.rest(values))
+        return aim.factor(values) * late[:, None] * unscaled(aim.rest(values))
 
     return predict
 
@@ -152,23 +151,24 @@ def predicted_waveforms(aim: Target, times: Floats) -> Predict:
             f"the record ends at {1e3 * last:.4g} ms, after the scene's Tacton of "
             f"{1e3 * duration:.4g} ms; lengthen the Tacton, or cut off the record"
         )
-    base = _from_cache(lambda values: _history(aim, values, last))
+
+    @lru_cache(maxsize=32)
+    def history(items: tuple[tuple[str, float], ...]) -> CubicSpline:
+        if aim.reduced:
+            response = parametric.answer(aim.reduced, dict(items))
+        else:
+            scene = aim.scene_with(dict(items))
+            count = int(np.ceil(2 * last * SAMPLE_RATE)) + 2
+            response = compute(scene, aim.model, times=sample_times(scene)[:count])
+        return CubicSpline(response.times, response.values)
 
     def predict(values: Values) -> Floats:
         t = times - values.get(DELAY, 0.0) / 1e3
-        history = base(aim.rest(values))
-        begun, at = (t >= 0)[:, None], np.minimum(t, history.x[-1])
-        return aim.factor(values) * np.where(begun, history(at), 0.0)
+        unscaled = history(aim.rest(values))
+        begun, at = (t >= 0)[:, None], np.minimum(t, unscaled.x[-1])
+        return aim.factor(values) * np.where(begun, unscaled(at), 0.0)
 
     return predict
-
-
-def _from_cache(function: Callable[[Values], Any]) -> Callable[[Values], Any]:
-    @lru_cache(maxsize=32)
-    def of_items(items: tuple[tuple[str, float], ...]) -> Any:
-        return function(dict(items))
-
-    return lambda values: of_items(tuple(sorted(values.items())))
 
 
 def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
@@ -197,14 +197,3 @@ def _flat_lines_of(scene: Scene) -> tuple[Floats, Complex]:
     each = [field_lines(*part, points, threshold=weakest) for part in parts]
     frequencies, amplitudes = zip(*each, strict=True)
     return merge_lines(np.concatenate(frequencies), np.vstack(amplitudes)[..., 0])
-
-
-def _history(aim: Target, values: Values, last: float) -> CubicSpline:
-    """Return interpolated waveforms (t, p) from rest up to at least `last` in s."""
-    if aim.reduced:
-        response = parametric.answer(aim.reduced, values)
-    else:
-        scene = aim.scene_with(values)
-        count = int(np.ceil(2 * last * SAMPLE_RATE)) + 2
-        response = compute(scene, aim.model, times=sample_times(scene)[:count])
-    return CubicSpline(response.times, response.values)
