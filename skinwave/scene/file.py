@@ -200,22 +200,15 @@ def to_table(scene: Scene) -> dict[str, Any]:
         "probes": (scene,),
     }
     table: dict[str, Any] = {"name": scene.name}
-    left = _unused_keys(scene)
+    unused = _unused_keys(scene)
     for section, keys in SECTIONS.items():
-        if section in left:
+        if section in unused:
             continue
         table[section] = {}
         for key, field in keys.items():
-            if key in DERIVED or f"{section}.{key}" in left:
-                continue
-            source = next(s for s in sources[section] if hasattr(s, field.name))
-            if section != "tacton" or key not in unused_tacton_keys(tacton):
+            if key not in DERIVED and f"{section}.{key}" not in unused:
+                source = next(s for s in sources[section] if hasattr(s, field.name))
                 table[section][key] = field.write(getattr(source, field.name))
-    if not body.of_kind.discretise:
-        table["body"] = {"kind": "none"}
-        del table["placement"]
-    for key in {key for kind in KINDS.values() for key in kind.keys} - set(body.of_kind.keys):
-        table["body"].pop(key, None)
     for key, given in scene.spreads:
         if (value := value_at(table, key)) is not None:
             table = with_value(table, key.split("."), distribution_table(value, given))
@@ -223,24 +216,27 @@ def to_table(scene: Scene) -> dict[str, Any]:
 
 
 def _unused_keys(scene: Scene) -> set[str]:
-    """Sections and dotted keys that do not apply to the scene's load and base."""
-    load = scene.load.of_kind
-    own = SECTIONS["load"].items()
-    has = {"kind", "gravity", *load.defaults}
-    has |= {"support_motion"} if scene.load.support_motion else set()
-    left = {f"load.{key}" for key, field in own if field.name not in has}
-    left |= set() if load.is_of_device else {"focus"}
-    has_map = isinstance(scene.pressure.profile, SpotMap)
-    left |= {"focus.height_mm"} if has_map else {"focus.file", "focus.unit"}
-    return left | (set() if scene.body.base_stiffness else {"body.base_stiffness_n_per_m3"})
-
-
-def unused_tacton_keys(tacton: Tacton) -> set[str]:
-    """Return the keys of a Tacton that do not apply to its other values."""
-    keys = {key for key in ("rhythm", "signal") if getattr(tacton, key) is None}
-    if tacton.trajectory.shape != "recorded":
-        keys |= {"times_s", "levels", "hold"}
-    return keys if tacton.trajectory.shape in BY_POINTS else keys | {"points_mm"}
+    """Sections and dotted keys that do not apply to the scene's other values."""
+    tacton, body, load = scene.tacton, scene.body, scene.load
+    shape, has_map = tacton.trajectory.shape, isinstance(scene.pressure.profile, SpotMap)
+    of_load = {"kind", "gravity", *load.of_kind.defaults}
+    of_load |= {"support_motion"} if load.support_motion else set()
+    of_others = {key for kind in KINDS.values() for key in kind.keys} - {*body.of_kind.keys}
+    of_others |= set() if body.of_kind.discretise else SECTIONS["body"].keys() - {"kind"}
+    unused = {
+        "tacton.rhythm": tacton.rhythm is None,
+        "tacton.signal": tacton.signal is None,
+        **dict.fromkeys(("tacton.times_s", "tacton.levels", "tacton.hold"), shape != "recorded"),
+        "tacton.points_mm": shape not in BY_POINTS,
+        "focus": not load.of_kind.is_of_device,
+        "focus.height_mm": has_map,
+        **dict.fromkeys(("focus.file", "focus.unit"), not has_map),
+        "body.base_stiffness_n_per_m3": not body.base_stiffness,
+        "placement": not body.of_kind.discretise,
+        **{f"load.{key}": own.name not in of_load for key, own in SECTIONS["load"].items()},
+        **dict.fromkeys((f"body.{key}" for key in of_others), True),
+    }
+    return {key for key, is_unused in unused.items() if is_unused}
 
 
 def _preset(scene: dict[str, Any]) -> tuple[Body | None, dict[str, Any]]:
