@@ -13,7 +13,7 @@ from skinwave.measure.intervals import CONFIDENCE, Estimate, Intervals, interval
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.observed import KINDS, data_of
 from skinwave.measure.parameters import Parameter, check_limits, of_scene, parse
-from skinwave.measure.predicted import Target, target, with_reduction
+from skinwave.measure.predicted import Target, target_of, with_reduction
 from skinwave.measure.search import Problem, Solution, minimise
 from skinwave.planning.plan import model_from_rest
 from skinwave.scene.distributions import Distribution
@@ -106,13 +106,13 @@ def fit(
     kind = choose("kind", kind or ("lines" if measured.is_spectrum else "waveforms"), KINDS)
     if model == "auto":
         model = model_from_rest(scene)[0].name
-    aim = target(scene, model, measured.record, measured.places)
+    target = target_of(scene, model, measured.record, measured.places)
     check_limits(scene, parameters)
-    aim = with_reduction(aim, parameters, progress)
-    data = data_of(kind, measured, aim)
-    problem = Problem(parameters=parameters, data=data, linear=aim.linear)
+    target = with_reduction(target, parameters, progress)
+    data = data_of(kind, measured, target)
+    problem = Problem(parameters=parameters, data=data, linear=target.linear)
     solution = minimise(problem, starts, seed, progress)
-    return Fit(measured=measured, target=aim, solution=solution, intervals=intervals(solution))
+    return Fit(measured=measured, target=target, solution=solution, intervals=intervals(solution))
 
 
 def _distribution(limits: Parameter, estimate: Estimate, half: float) -> Distribution:

@@ -16,7 +16,7 @@ from simple_model.numbers import first_few, plural
 from simple_model.response import SETTLE, fit_lines
 from skinwave.measure.lines import MeasuredLines, as_response, holm, lines_of, measurable
 from skinwave.measure.measurement import Measurement
-from skinwave.measure.predicted import Predict, Target, predicted_lines, predicted_waveforms
+from skinwave.measure.predicted import Predict, Target, line_predictor, waveform_predictor
 from skinwave.typing import Complex, Floats
 
 KINDS = ("waveforms", "lines", "amplitudes")
@@ -95,22 +95,25 @@ class Data:
         return np.asarray(white.reshape(each.shape).transpose(2, 1, 0).reshape(over.shape))
 
 
-def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
+def data_of(kind: str, measured: Measurement, target: Target) -> Data:
     """Return data of one of the `KINDS`. Raises a ValueError if the measurement has none."""
-    return _waveforms(measured, aim) if kind == "waveforms" else _of_lines(kind, measured, aim)
+    if kind == "waveforms":
+        return _waveforms(measured, target)
+    return _of_lines(kind, measured, target)
 
 
-def load_lines(measured: Measurement, aim: Target) -> LoadLines:
+def load_lines(measured: Measurement, target: Target) -> LoadLines:
     """Return the lines of the load that are in the measurement and that the model predicts."""
-    load, lost = line_names(aim.scene.pressure), dict[str, float]()
+    load, lost = line_names(target.scene.pressure), dict[str, float]()
     if measured.is_spectrum:
         away = np.abs(measured.frequencies[:, None] - load.frequencies).min(axis=0)
-        near = (away <= aim.same_line * load.frequencies) & measurable(measured, load.frequencies)
+        near = away <= target.same_line * load.frequencies
+        near &= measurable(measured, load.frequencies)
         kept = {load.names[k]: float(load.frequencies[k]) for k in np.flatnonzero(near)}
     else:
-        kept, lost = resolved_lines(aim.scene.pressure, as_response(measured))
+        kept, lost = resolved_lines(target.scene.pressure, as_response(measured))
     lines, names = lines_of(measured, np.array(list(kept.values()))), np.array(list(kept))
-    predicted = aim.predicts(lines.frequencies)
+    predicted = target.predicts(lines.frequencies)
     strengths = dict(zip(load.names, load.strengths.tolist(), strict=True))
     weak_ratio = 0.05  # of the load's strongest line; weaker unresolved lines are left out
     least = weak_ratio * float(load.strengths.max(initial=0.0))
@@ -140,9 +143,9 @@ def _not_predicted(
     return sorted(each, key=lambda line: -line.share)
 
 
-def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
+def _of_lines(kind: str, measured: Measurement, target: Target) -> Data:
     """Return real and imaginary parts of amplitudes, or moduli with noise (Rice's distribution)."""
-    lines = load_lines(measured, aim)
+    lines = load_lines(measured, target)
     if lines.unresolved:
         names = first_few(lines.unresolved)
         raise ValueError(f"the record is too short to resolve {names}; use --to waveforms")
@@ -150,7 +153,7 @@ def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
         raise ValueError("the measurement resolves no line of the scene's load; check the Tacton")
     amplitudes = lines.measured
     a, f, correlation = amplitudes.mean, amplitudes.frequencies, amplitudes.correlation
-    predict, runs = predicted_lines(aim, f), len(amplitudes.each)
+    predict, runs = line_predictor(target, f), len(amplitudes.each)
     known = f"{runs} repetitions" if runs > 1 else "the noise floor"
     noise = f"with errors from {known}"
     if not lines.is_known:
@@ -188,7 +191,7 @@ def _whitening(correlation: Floats) -> Floats:
     return np.asarray(vectors.swapaxes(-1, -2) / np.sqrt(np.maximum(values, least))[..., None])
 
 
-def _waveforms(measured: Measurement, aim: Target) -> Data:
+def _waveforms(measured: Measurement, target: Target) -> Data:
     """Return data of waveforms: steady ones, predicted as a sum of lines, or from rest."""
     if measured.is_spectrum:
         raise ValueError("the measurement has spectra; fit lines or amplitudes")
@@ -196,12 +199,12 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
     most_values = 20_000_000  # of waveforms
     if count > most_values:
         raise ValueError(f"{count:,} values of waveforms exceed {most_values:,}; fit lines")
-    lines, mean = load_lines(measured, aim), measured.mean
+    lines, mean = load_lines(measured, target), measured.mean
     frequencies = lines.measured.frequencies
-    rough = _of_lines("lines", measured, aim) if lines.names and not lines.unresolved else None
+    rough = _of_lines("lines", measured, target) if lines.names and not lines.unresolved else None
     if rough and is_steady(measured, frequencies):
         rest = fit_lines(as_response(measured), frequencies)[1]
-        predict_lines = predicted_lines(aim, frequencies)
+        predict_lines = line_predictor(target, frequencies)
         waves = np.exp(2j * pi * measured.times[:, None] * frequencies)
 
         def predict_steady(values: Mapping[str, float]) -> Floats:
@@ -213,16 +216,16 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
             f"steady waveforms about their mean, as {lines.words}", rough,
         )  # fmt: skip
         return replace(data, lines=lines.names, left_out=lines.left_out)
-    if aim.record.is_steady:
+    if target.record.is_steady:
         names = first_few(lines.unresolved)
         problem = f"are too short to resolve {names}" if names else "have a transient"
         cure = "a longer record" if names else "fit lines"
-        raise ValueError(f"the waveforms {problem}, but {aim.model} computes only the steady "
+        raise ValueError(f"the waveforms {problem}, but {target.model} computes only the steady "
                          f"state; take another model, or {cure}")  # fmt: skip
     differences = np.diff(mean, 4, axis=0)  # nearly free of smooth motion
     fourth_difference = 70.0  # sum of its squared coefficients
     noise = np.sqrt((differences**2).mean(axis=0) / fourth_difference)
-    predict = predicted_waveforms(aim, measured.times)
+    predict = waveform_predictor(target, measured.times)
     return _in_time(measured, mean, predict, noise, "waveforms from rest at t = 0", rough)
 
 

@@ -95,7 +95,7 @@ class Target:
         return self.strength[0] in values and self.strength[0] in self.linear
 
 
-def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Target:
+def target_of(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Target:
     """Return the target of a model; raise a ValueError if it cannot take scene or quantity."""
     if not quantity.is_normal:
         raise ValueError(f"a fit needs motion normal to the body, not {quantity.words}")
@@ -104,24 +104,24 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
     record = named(model)
     if not record.needs_body:
         raise ValueError(f"{model} has no body to fit; choose another model")
-    aim = Target(scene=scene, model=model, quantity=quantity, places=places)
-    check_takes(record, aim.scene_with({}))
-    return aim
+    target = Target(scene=scene, model=model, quantity=quantity, places=places)
+    check_takes(record, target.scene_with({}))
+    return target
 
 
-def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> Target:
+def with_reduction(target: Target, parameters: Parameters, progress: Progress) -> Target:
     """Return the target, with a shared reduction of its body if one covers all ranges."""
     ranges = {each.key: (each.low, each.high) for each in parameters.free}
-    ranges = {key: ranges[key] for key, _ in aim.rest(dict.fromkeys(ranges, 1.0))}
-    if not aim.record.is_reduced or parameters.ties or not ranges:
-        return aim
+    ranges = {key: ranges[key] for key, _ in target.rest(dict.fromkeys(ranges, 1.0))}
+    if not target.record.is_reduced or parameters.ties or not ranges:
+        return target
     expected_runs = 200  # of a fit
-    together = covering(aim.scene_with({}), ranges, expected_runs)
+    together = covering(target.scene_with({}), ranges, expected_runs)
     reduced = try_shared_body(together, SolveOptions(progress=progress))
-    return replace(aim, reduced=reduced) if reduced else aim
+    return replace(target, reduced=reduced) if reduced else target
 
 
-def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
+def line_predictor(target: Target, frequencies: Floats) -> Predict:
     """Return a function of the values that predicts complex amplitudes (f, p), SI, of Re a exp(2 pi
     i f t) at frequencies (f,) in Hz. It raises a ValueError if the load has no line at one of them.
     """
@@ -129,23 +129,24 @@ def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
     @lru_cache(maxsize=32)
     def unscaled(items: tuple[tuple[str, float], ...]) -> Complex:
         values = dict(items)
-        if aim.reduced:
-            f, a = parametric.lines(aim.reduced, values)
+        if target.reduced:
+            f, a = parametric.lines(target.reduced, values)
             return np.asarray(a[np.abs(f[:, None] - frequencies).argmin(axis=0)])
-        if aim.record.is_infinite:
-            return _flat_lines(aim, values, frequencies)
-        return np.asarray(fit_lines(compute(aim.scene_with(values), aim.model), frequencies)[0])
+        if target.record.is_infinite:
+            return _flat_lines(target, values, frequencies)
+        response = compute(target.scene_with(values), target.model)
+        return np.asarray(fit_lines(response, frequencies)[0])
 
     def predict(values: Values) -> Complex:
         late = np.exp(-2j * pi * frequencies * values.get(DELAY, 0.0) / 1e3)
-        return aim.factor(values) * late[:, None] * unscaled(aim.rest(values))
+        return target.factor(values) * late[:, None] * unscaled(target.rest(values))
 
     return predict
 
 
-def predicted_waveforms(aim: Target, times: Floats) -> Predict:
+def waveform_predictor(target: Target, times: Floats) -> Predict:
     """Return a function of the values that predicts waveforms (t, p) in SI from rest at t = 0."""
-    last, duration = float(times[-1]), aim.scene.tacton.duration
+    last, duration = float(times[-1]), target.scene.tacton.duration
     if last > duration + 1 / SAMPLE_RATE:
         raise ValueError(
             f"the record ends at {1e3 * last:.4g} ms, after the scene's Tacton of "
@@ -154,28 +155,28 @@ def predicted_waveforms(aim: Target, times: Floats) -> Predict:
 
     @lru_cache(maxsize=32)
     def history(items: tuple[tuple[str, float], ...]) -> CubicSpline:
-        if aim.reduced:
-            response = parametric.answer(aim.reduced, dict(items))
+        if target.reduced:
+            response = parametric.answer(target.reduced, dict(items))
         else:
-            scene = aim.scene_with(dict(items))
+            scene = target.scene_with(dict(items))
             count = int(np.ceil(2 * last * SAMPLE_RATE)) + 2
-            response = compute(scene, aim.model, times=sample_times(scene)[:count])
+            response = compute(scene, target.model, times=sample_times(scene)[:count])
         return CubicSpline(response.times, response.values)
 
     def predict(values: Values) -> Floats:
         t = times - values.get(DELAY, 0.0) / 1e3
-        unscaled = history(aim.rest(values))
+        unscaled = history(target.rest(values))
         begun, at = (t >= 0)[:, None], np.minimum(t, unscaled.x[-1])
-        return aim.factor(values) * np.where(begun, unscaled(at), 0.0)
+        return target.factor(values) * np.where(begun, unscaled(at), 0.0)
 
     return predict
 
 
-def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
+def _flat_lines(target: Target, values: Values, frequencies: Floats) -> Complex:
     """Return lines from wavenumber integrals."""
-    f, a = _flat_lines_of(aim.scene_with(values))
+    f, a = _flat_lines_of(target.scene_with(values))
     at = np.abs(f[:, None] - frequencies).argmin(axis=0)
-    apart = np.abs(f[at] - frequencies) > aim.same_line * frequencies
+    apart = np.abs(f[at] - frequencies) > target.same_line * frequencies
     if apart.any():
         raise ValueError(
             f"the load has no line at the measured {frequencies[apart][0]:.1f} Hz if "

@@ -19,7 +19,7 @@ from skinwave.measure.fit_page import fitted_scene, summary
 from skinwave.measure.misfit import NOT_DESCRIBED
 from skinwave.measure.observed import is_steady, load_lines
 from skinwave.measure.parameters import check_limits, parse
-from skinwave.measure.predicted import predicted_lines, target
+from skinwave.measure.predicted import line_predictor, target_of
 from skinwave.measure.writing import write
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import loads
@@ -173,11 +173,11 @@ def test_ties_follow_what_is_varied(scene, lines):
 
 def test_offsets_move_the_places(scene, lines):
     f, a = lines
-    aim = target(scene, "flat-body", spectra(scene, lines).record, scene.probe_points)
-    moved = replace(aim, places=aim.places + [1e-3, -2e-3])
-    by_offset = predicted_lines(aim, f)(TRUE | {"offset_x_mm": 1.0, "offset_y_mm": -2.0})
-    assert by_offset == pytest.approx(predicted_lines(moved, f)(TRUE), rel=1e-9)
-    assert predicted_lines(aim, f)(TRUE) == pytest.approx(a, rel=1e-4)
+    target = target_of(scene, "flat-body", spectra(scene, lines).record, scene.probe_points)
+    moved = replace(target, places=target.places + [1e-3, -2e-3])
+    by_offset = line_predictor(target, f)(TRUE | {"offset_x_mm": 1.0, "offset_y_mm": -2.0})
+    assert by_offset == pytest.approx(line_predictor(moved, f)(TRUE), rel=1e-9)
+    assert line_predictor(target, f)(TRUE) == pytest.approx(a, rel=1e-4)
 
 
 def waveforms(scene, x, t, noise=0.01, repetitions=2):
@@ -262,10 +262,10 @@ def test_what_cannot_be_fitted_is_refused(scene, lines):
 
 def test_lines_that_a_reduced_body_leaves_out_are_reported(scene, lines):
     measured = spectra(scene, lines)
-    aim = target(scene, "flat-body", measured.record, scene.probe_points)
-    every = load_lines(measured, aim)
+    target = target_of(scene, "flat-body", measured.record, scene.probe_points)
+    every = load_lines(measured, target)
     assert every.left_out == ()
-    small = replace(aim, reduced=SimpleNamespace(frequencies=every.measured.frequencies[:1]))
+    small = replace(target, reduced=SimpleNamespace(frequencies=every.measured.frequencies[:1]))
     left = load_lines(measured, small).left_out[0]
     power = (np.abs(every.measured.mean) ** 2 - 2 * every.error**2).sum(axis=1)
     assert left.frequency == 280.0

@@ -125,10 +125,10 @@ def test_gains_of_close_lines_hold_the_truth(monkeypatch, colour, repetitions, k
                                values=clean + noise)  # fmt: skip
         lines = {f"line {k}": each for k, each in enumerate(f)}
         monkeypatch.setattr(observed, "resolved_lines", lambda *_, lines=lines: (lines, {}))
-        monkeypatch.setattr(observed, "predicted_lines", lambda *_, a=model: lambda values: a)
-        aim = SimpleNamespace(scene=loads("[tacton]\nam_frequency_hz = 140\n"),
+        monkeypatch.setattr(observed, "line_predictor", lambda *_, a=model: lambda values: a)
+        target = SimpleNamespace(scene=loads("[tacton]\nam_frequency_hz = 140\n"),
                               predicts=lambda f: np.full(len(f), True))  # fmt: skip
-        data = observed.data_of(kind, measured, aim)
+        data = observed.data_of(kind, measured, target)
         assert data.is_known
         slope, y = (data.whiten(x).reshape(len(f), -1, draws)
                     for x in (data.predict({}), data.values))  # fmt: skip

@@ -312,9 +312,9 @@ def test_a_fit_reduces_a_sheet_in_air_once(monkeypatch):
     whole = parametric.prepare
     coarse = lambda *given, **how: whole(*given, **how | {"h": 0.015})  # noqa: E731
     monkeypatch.setattr(parametric, "prepare", coarse)
-    aim = predicted.target(SCENE, "fem", SCENE.reading.record, SCENE.probe_points)
+    target = predicted.target_of(SCENE, "fem", SCENE.reading.record, SCENE.probe_points)
     parameters = parse([f"{MODULUS}=0.9e9:1.1e9", f"{THICKNESS}=0.09:0.11"], [])
-    found = predicted.with_reduction(aim, parameters, silent).reduced
+    found = predicted.with_reduction(target, parameters, silent).reduced
     assert {key.key for key in found.keys} == {MODULUS, THICKNESS}
 
 

@@ -20,7 +20,7 @@ from skinwave import Body, Load, Scene, SupportMotion, dumps, loads
 from skinwave.bodies.build import build, operators
 from skinwave.measure import Measurement
 from skinwave.measure.fit import fit
-from skinwave.measure.predicted import predicted_lines, predicted_waveforms, target
+from skinwave.measure.predicted import line_predictor, target_of, waveform_predictor
 from skinwave.models import parametric
 from skinwave.models.meshed import load_in_steps, surface_load
 from skinwave.models.options import SolveOptions
@@ -294,8 +294,8 @@ def test_pressure_only_functions_refuse_other_loads():
     scene = loads(SHEAR + SMALL)
     heavy = replace(scene, load=Load(gravity=9.81))
     with pytest.raises(ValueError, match="focus alone, not pressure and gravity"):
-        target(heavy, "flat-body", DISPLACEMENT, scene.probe_points)
-    assert target(heavy, "fem", DISPLACEMENT, scene.probe_points).linear == ("gain",)
+        target_of(heavy, "flat-body", DISPLACEMENT, scene.probe_points)
+    assert target_of(heavy, "fem", DISPLACEMENT, scene.probe_points).linear == ("gain",)
     with pytest.raises(ValueError, match="a pattern of a device needs"):
         write_pattern(scene, ".csv", Options())
     with pytest.raises(ValueError, match="needs a load normal to it"):
@@ -347,12 +347,12 @@ def test_a_fit_recovers_the_modulus_and_the_force_of_a_contact():
 def test_predictions_of_layers_under_tractions_are_those_of_the_model():
     text = AROUND.replace("0.03", "0.2") + SMALL.replace("poisson = 0.0", "poisson = 0.49") + SHEAR
     scene = loads(text)
-    aim = target(scene, "flat-body", DISPLACEMENT, scene.probe_points)
+    target = target_of(scene, "flat-body", DISPLACEMENT, scene.probe_points)
     expected, _ = fit_lines(compute(scene, "flat-body-harmonic"), np.array([200.0]))
-    found = predicted_lines(aim, np.array([200.0]))({})
+    found = line_predictor(target, np.array([200.0]))({})
     np.testing.assert_allclose(found, expected, rtol=0.02, atol=1e-3 * np.abs(expected).max())
     rest = compute(scene, "flat-body")
-    assert far(predicted_waveforms(aim, rest.times)({}), rest.values).max() < 1e-3
+    assert far(waveform_predictor(target, rest.times)({}), rest.values).max() < 1e-3
 
 
 def shaken(body=COLUMN, motion=UP, **changes):
