@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene.file import read
     from skinwave.scene.scene import body_name
     from skinwave.scene.spreads import spreads_of
-    from skinwave.studies.pages import Gallery, begin_pictures, write_run_page
+    from skinwave.studies.pages import Gallery, begin_gallery, write_run_page
     from skinwave.studies.surfaces import begin_surface
     from skinwave.sweeps.sampling import check
     from skinwave.system.processes import pool
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         pool(1) as workers,
     ):
         moved = begin_surface(scene, solving(options, progress, model=options.model), workers)
-        begun = begin_pictures(scene, moved, workers) if moved else {}
+        gallery = begin_gallery(scene, moved, workers) if moved else Gallery(workers=workers)
         plan = plan_of_command(options, scene, progress=progress)
         response = solve_as_planned(scene, plan)
         warn(w for w in response.effort.warnings if w not in plan.warnings)
@@ -70,8 +70,7 @@ def run(options: argparse.Namespace) -> int:
             more = _uncertainty(options, run, plan.h, folder, progress)
         command = record.command_entry(options)
         failures = write_run_page(
-            folder, run, more, command["typed"], moved=moved,
-            gallery=Gallery(workers=workers, begun=begun), progress=progress,
+            folder, run, more, command["typed"], moved=moved, gallery=gallery, progress=progress,
         )  # fmt: skip
         record.write(folder, command, scene=scene, response=response)
     effort = response.effort

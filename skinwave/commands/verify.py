@@ -75,12 +75,12 @@ def _run_published(options: argparse.Namespace) -> int:
 
 def _tradeoff(options: argparse.Namespace) -> int:
     from skinwave.scene.file import read
-    from skinwave.studies.tradeoff import sentences, study, write
+    from skinwave.studies.tradeoff import sentences, tradeoff, write
 
     scene, name = read(options.scene), f"{options.scene.stem}-tradeoff"
     inputs = [options.scene, *scene.files]
     with result_folder(options, name, inputs, scene) as (folder, progress):
-        found = study(scene, progress)
+        found = tradeoff(scene, progress)
         write(folder, scene, found)
     return closing(options, sentences(found), found.failures, accepted=found.is_converged)
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from simple_model import Response
 from simple_model.quantities import DISPLACEMENT, VELOCITY
 from skinwave.results import outputs, record
 from skinwave.results.run import Run
@@ -61,7 +62,7 @@ def write_run(folder: Path, run: Run, *, also: Callable[[Path], object] | None =
 def fill(folder: Path, run: Run) -> None:
     """Write scene.toml, responses.npz, lines.csv, effort.json and record.json of one run."""
     name = run.response.quantity if run.response.record.of_body else DISPLACEMENT.name
-    write_responses(folder / record.RESPONSES, {name: run, run.model: run})
+    write_responses(folder / record.RESPONSES, dict.fromkeys((name, run.model), run.response))
     write_lines(folder / "lines.csv", [run])
     effort = asdict(run.response.effort)
     del effort["errors"]  # in record.json
@@ -72,11 +73,11 @@ def fill(folder: Path, run: Run) -> None:
     record.write(folder, command, scene=run.scene, response=run.response)
 
 
-def write_responses(path: Path, runs: Mapping[str, Run]) -> None:
+def write_responses(path: Path, responses: Mapping[str, Response]) -> None:
     """Write times `t` in s, `probes` in m and, by name, values (t, p) in SI units."""
-    first = next(iter(runs.values())).response
+    first = next(iter(responses.values()))
     arrays: dict[str, Any] = {"t": first.times, "probes": first.probes}
-    arrays |= {name: run.response.values for name, run in runs.items()}
+    arrays |= {name: response.values for name, response in responses.items()}
     with open(path, "wb") as file:
         np.savez(file, **arrays)
 

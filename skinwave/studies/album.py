@@ -31,28 +31,13 @@ from skinwave.planning.plan import plan
 from skinwave.planning.record import Plan
 from skinwave.planning.simulate import compute, solve_as_planned
 from skinwave.report import description
-from skinwave.results import record, surface
+from skinwave.results import record, surface, views
 from skinwave.results.files import write_lines, write_run
 from skinwave.results.motion import REDUCTION_TOLERANCE, BodyMotion, probe_response, whole_motion
 from skinwave.results.playback import played_part
 from skinwave.results.run import Run
-from skinwave.results.surface import (
-    SurfaceField,
-    body_map,
-    element_map,
-    grid,
-    has_wavenumber_integral,
-)
-from skinwave.results.views import (
-    View,
-    body_view,
-    fastest_line,
-    flat_view,
-    kernel_view,
-    load,
-    save,
-    with_shade,
-)
+from skinwave.results.surface import SurfaceField, has_wavenumber_integral
+from skinwave.results.views import View
 from skinwave.scene import paper15
 from skinwave.scene.file import dumps, read
 from skinwave.scene.scene import BODIES, Scene, body_name, check_load, with_body
@@ -61,8 +46,6 @@ from skinwave.system.effort import silent
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.json_kinds import EFFORT, PLAN, effort_of, fitting
 from skinwave.typing import Floats
-
-PLANNED = 0.05  # tolerance of the plan on the page
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,9 +71,9 @@ class Album:
 def scene_columns(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
     """Return scenes by `Run.column`: of both point kernels, of its own body and of other presets.
 
-    A scene without a body is computed on the paper sheet and the skin slab, if its path and probes
-    fit. All but the published kernel receive the same load. Raises a ValueError if the load is not
-    a pressure, or if a body in `beside` is unknown or does not fit.
+    A scene without a body is computed on the bodies of `paper15.MEASURED_ON` that its path and
+    probes fit. All but the published kernel receive the same load. Raises a ValueError if the load
+    is not a pressure, or if a body in `beside` is unknown or does not fit.
     """
     check_load(scene, "a comparison with the point kernel")
     bodies: dict[str, Scene] = {}
@@ -129,21 +112,21 @@ def write_album(
             own = planned
             misfit = {"misfit": _misfit(run, view.moved)} if view and view.moved else {}
     write_lines(folder / "lines.csv", runs)
-    own = own or plan(scene, SolveOptions(tolerance=PLANNED))
-    table = own.table() | {"tolerance": PLANNED} | misfit
+    own = own or plan(scene, SolveOptions())
+    table = own.table() | {"tolerance": own.options.tolerance} | misfit
     (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
     return worst_warnings((run.body, run.response.effort) for run in runs), failures
 
 
 def write_view(view: View, folder: Path, failures: dict[str, str]) -> None:
     """Write a view and, for a body, the map of the probes' quantity unless it fails."""
-    save(folder / "view.npz", view)
-    scene, moved, (x, y) = view.scene, view.moved, grid(view.scene)
+    views.save(folder / "view.npz", view)
+    scene, moved, (x, y) = view.scene, view.moved, surface.grid(view.scene)
     with or_failed(failures, f"map of {view.column}"):
         if moved and not (scene.reading.is_plain and has_wavenumber_integral(scene)):
-            surface.save(folder / "map.npz", element_map(scene, moved, x, y))
+            surface.save(folder / "map.npz", surface.element_map(scene, moved, x, y))
         elif scene.reading.is_plain and view.body != "none":
-            surface.save(folder / "map.npz", body_map(scene, x, y))
+            surface.save(folder / "map.npz", surface.body_map(scene, x, y))
 
 
 def compute_views(
@@ -152,17 +135,16 @@ def compute_views(
 ) -> Iterator[tuple[View | None, Run, Plan | None]]:  # fmt: skip
     """Yield view, run and plan of each of `scene_columns`; the published kernel has no view.
 
-    Views use larger elements than responses, or modes of a plate. Reasons of bodies without a
-    response, and of missing views, are added to the failures; raises a ValueError if all fail.
+    Views use larger elements than responses, or modes of a plate. Adds the reasons of missing
+    responses and views to the failures. Raises a ValueError if all bodies fail.
     """
     columns, progress = scene_columns(scene, beside), options.progress
-    solving = replace(options, tolerance=PLANNED)
     meshed = {c: each for c, each in columns.items() if _has_elements(each, options.h)}
     moved: dict[str, BodyMotion] = {}
     with ThreadPoolExecutor(1) as beside_plans:
         moving = {c: beside_plans.submit(_pictured, each, options) for c, each in meshed.items()}
         plans = {
-            column: plan(each, solving)
+            column: plan(each, options)
             for column, each in columns.items() if each.body.of_kind.discretise
         }  # fmt: skip
         for column, future in moving.items():
@@ -170,7 +152,7 @@ def compute_views(
             with or_failed(failures, pictured):
                 moved[column] = future.result()
     tones = max(repetition_frequencies(scene.tacton).values(), default=0.0)
-    fastest = max(map(fastest_line, moved.values()), default=tones)
+    fastest = max(map(views.fastest_line, moved.values()), default=tones)
     part = played_part(scene.pressure, fastest, frames)  # all views play the same part
     reach = _reach(columns, moved)
     for column, each in columns.items():
@@ -178,7 +160,7 @@ def compute_views(
         if column not in plans:
             run = Run(tacton=scene.name, body="none", scene=each, response=compute(each, column))
             is_shown = column == SAME_LOAD.name
-            yield kernel_view(each, reach, part) if is_shown else None, run, None
+            yield views.kernel_view(each, reach, part) if is_shown else None, run, None
             continue
         own: Run | None = None
         with or_failed(failures, f"response of {column}"):
@@ -191,8 +173,8 @@ def compute_views(
         if pictured not in failures:
             with or_failed(failures, pictured):
                 view = (
-                    body_view(each, column, moved[column], part) if column in moved
-                    else flat_view(own, reach, part)
+                    views.body_view(each, column, moved[column], part) if column in moved
+                    else views.flat_view(own, reach, part)
                 )  # fmt: skip
         yield view, own, plans[column]
     if plans and all(f"response of {column}" in failures for column in plans):
@@ -221,9 +203,8 @@ def _reach(columns: Mapping[str, Scene], moved: Mapping[str, BodyMotion]) -> Flo
 def _has_elements(scene: Scene, h: float | None) -> bool:
     """Whether pictures are drawn by finite elements.
 
-    Without a given element size, plates are drawn from their modes, and layers that cannot be
-    meshed from their wavenumber integral. Raises a ValueError if a body must be meshed but cannot
-    be.
+    Unless an element size is given, plates are drawn from their modes, and layers that cannot be
+    meshed from their wavenumber integral. Raises a ValueError if other bodies cannot be meshed.
     """
     if not scene.body.of_kind.discretise:
         return False
@@ -252,15 +233,13 @@ def quantity_views(
     if scene.reading.record is DISPLACEMENT:
         return [view for view, _ in computed], warnings, failures
     missing = description.no_kernel_text(scene)
-    views = []
+    shaded = []
     for view, run in computed:
         with or_failed(failures, f"{scene.quantity} of {view.column}"):
-            views += [with_shade(view, run.scene)] if len(view.tets) else []
-    if not views and failures:
-        raise ValueError(failure_text(failures))
-    if not views:
-        raise ValueError(f"{missing}. Give the scene a body")
-    return views, [*warnings, missing], failures
+            shaded += [views.with_shade(view, run.scene)] if len(view.tets) else []
+    if not shaded:
+        raise ValueError(failure_text(failures) or f"{missing}. Give the scene a body")
+    return shaded, [*warnings, missing], failures
 
 
 def _misfit(run: Run, moved: BodyMotion) -> float:
@@ -271,8 +250,7 @@ def _misfit(run: Run, moved: BodyMotion) -> float:
 
 
 def open_album(folder: Path) -> Album:
-    """Read the results in a folder written by `run`, `compare` or `report`, without any
-    computation.
+    """Read the results in a folder of `run`, `compare` or `report`, without any computation.
 
     Raises a ValueError if the folder has no results.
     """
@@ -283,7 +261,7 @@ def open_album(folder: Path) -> Album:
         raise ValueError(
             f"{folder} contains no {record.RESPONSES}. Give a scene file or a result folder"
         )
-    views = [load(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
+    saved = [views.load(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
     own, scene_of = folder / "scene.toml", {run.column: run.scene for run in runs}
     scene = read(own) if own.exists() else runs[-1].scene
     maps = {
@@ -293,7 +271,7 @@ def open_album(folder: Path) -> Album:
     }
     return Album(
         title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
-        views={view.column: view for view in views}, maps=maps,
+        views={view.column: view for view in saved}, maps=maps,
         planned=_read_json(folder / "plan.json", PLAN),
     )  # fmt: skip
 

@@ -28,66 +28,38 @@ from skinwave.studies.pages import Gallery
 from skinwave.system.document import Details, Part, Report, preformat
 from skinwave.system.table import Column, Table
 
-LOWEST, HIGHEST = 10.0, 650.0  # Hz
-LINE_COLUMNS = (
-    "line", Column("frequency_hz", "frequency", "Hz", 4), Column("pressure_pa", "pressure", "Pa"),
-    Column("mode", "driven mode"), "kind", Column("share", digits=2),
-    Column("phase_speed_m_per_s", "phase speed", "m/s"),
-    Column("group_speed_m_per_s", "group speed", "m/s"),
-    Column("wavelength_mm", "wavelength", "mm"), Column("decay_length_mm", "1/e length", "mm"),
-    Column("focus_over_phase_speed", "focus over phase speed"),
-    Column("mach_angle_deg", "Mach angle", "degrees", 2),
-)  # fmt: skip
+LOWEST = 10.0  # Hz
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrivenLine:
-    """A line of a load: its frequency in Hz, its largest amplitude in Pa on the path, the mode that
-    it drives, the index of the frequency, and the share of the mode in the motion.
+    """A line of a load, and the mode that it drives, at its frequency in Hz.
+
+    `strength` is the largest amplitude in Pa on the path, `share` that of the mode in the motion.
+    `kind` is one of `simple_model.layers.dispersion.KINDS`. Speeds are in m/s; `decay_length` is
+    the 1/e length in m. The group speed is None if the mode carries no energy, the Mach angle in
+    degrees also if the focus is slower than the wave.
     """
 
     name: str
     frequency: float
     strength: float
-    mode: Mode
-    at: int
+    mode: str
+    kind: str
     share: float
+    phase_speed: float
+    group_speed: float | None
+    decay_length: float
     focus_speed: float
-
-    @property
-    def phase_speed(self) -> float:
-        """Phase speed of the mode, m/s."""
-        return float(self.mode.phase_speed[self.at])
-
-    @property
-    def decay_length(self) -> float:
-        """1/e length of the mode, m."""
-        return float(self.mode.decay_length[self.at])
-
-    @property
-    def kind(self) -> str:
-        """Kind of the mode at this frequency, one of `simple_model.layers.dispersion.KINDS`."""
-        return str(self.mode.kinds[self.at])
-
-    @property
-    def is_wave(self) -> bool:
-        """Whether the mode carries energy."""
-        return bool(self.mode.is_wave[self.at])
-
-    @property
-    def mach_angle(self) -> float | None:
-        """Mach angle in degrees, or None if the focus is slower or there is no wave."""
-        angle = mach_angle(self.phase_speed, self.focus_speed) if self.is_wave else None
-        return None if angle is None else degrees(angle)
+    mach_angle: float | None
 
     @property
     def row(self) -> list[object]:
-        """Cells of `LINE_COLUMNS`."""
+        """Cells of the table `driven-lines`."""
         return [
-            self.name, self.frequency, self.strength, self.mode.name,
-            self.kind, self.share, self.phase_speed,
-            float(self.mode.group_speed[self.at]) if self.is_wave else None,
-            1e3 * self.phase_speed / self.frequency, 1e3 * self.decay_length,
+            self.name, self.frequency, self.strength, self.mode, self.kind, self.share,
+            self.phase_speed, self.group_speed, 1e3 * self.phase_speed / self.frequency,
+            1e3 * self.decay_length,
             self.focus_speed / self.phase_speed if self.focus_speed else None, self.mach_angle,
         ]  # fmt: skip
 
@@ -100,14 +72,9 @@ class DrivenModes:
     curves: DispersionCurves
     lines: tuple[DrivenLine, ...]
 
-    @property
-    def cut_on(self) -> float:
-        """Frequency in Hz below which no computed mode carries energy."""
-        return min(mode.cut_on for mode in self.curves.modes)
-
 
 def driven_modes(
-    scene: Scene, *, highest: float = HIGHEST, spacing: int = 48, most: int = 6
+    scene: Scene, *, highest: float = 650.0, spacing: int = 48, most: int = 6
 ) -> DrivenModes:
     """Return curves of `most` modes of a scene's body up to the `highest` frequency in Hz.
 
@@ -117,17 +84,17 @@ def driven_modes(
     if not (isfinite(highest) and highest > 2 * LOWEST):
         raise ValueError(
             f"the highest frequency of dispersion curves is {highest:g} Hz; it must be above "
-            f"{2 * LOWEST:g} Hz. {HIGHEST:g} Hz covers what skin perceives"
+            f"{2 * LOWEST:g} Hz. 650 Hz covers what skin perceives"
         )
-    weakest, most_lines = 1e-2, 12  # ratio to the strongest line of the load; number of lines
-    load = line_names(scene.pressure, weakest, most=most_lines)
+    weakest_ratio, most_lines = 1e-2, 12  # to the strongest line of the load
+    load = line_names(scene.pressure, weakest_ratio, most=most_lines)
     within = (load.frequencies > LOWEST) & (load.frequencies < highest)
     own, others = load.frequencies[within], np.linspace(LOWEST, highest, spacing)
     same_frequency = 0.2  # Hz: no other frequency is computed this close to a line
     near = np.abs(others[:, None] - own).min(axis=1, initial=np.inf) < same_frequency
     curves = dispersion(scene.body, np.unique(np.concatenate([own, others[~near]])), most)
     amplitudes, path = _amplitudes(curves.modes, scene.pressure), scene.tacton.trajectory
-    lines = []
+    focus_speed, lines = 0.0 if path.is_static else path.speed, []
     for k in np.argsort(-load.strengths, kind="stable").tolist():
         if not within[k]:
             continue
@@ -135,11 +102,15 @@ def driven_modes(
         size = np.nan_to_num(np.abs(amplitudes[:, at]))
         waves = np.array([mode.is_wave[at] for mode in curves.modes])
         best = int(np.argmax(size + waves * size.sum()))  # propagating modes first
+        mode, phase_speed = curves.modes[best], float(curves.modes[best].phase_speed[at])
+        angle = mach_angle(phase_speed, focus_speed) if waves[best] else None
         lines.append(DrivenLine(
             name=load.names[k], frequency=float(load.frequencies[k]),
-            strength=float(load.strengths[k]), mode=curves.modes[best], at=at,
-            share=float(size[best] / max(size.sum(), 1e-300)),
-            focus_speed=0.0 if path.is_static else path.speed,
+            strength=float(load.strengths[k]), mode=mode.name, kind=str(mode.kinds[at]),
+            share=float(size[best] / max(size.sum(), 1e-300)), phase_speed=phase_speed,
+            group_speed=float(mode.group_speed[at]) if waves[best] else None,
+            decay_length=float(mode.decay_length[at]), focus_speed=focus_speed,
+            mach_angle=None if angle is None else degrees(angle),
         ))  # fmt: skip
     return DrivenModes(scene=scene, curves=curves, lines=tuple(lines))
 
@@ -159,12 +130,13 @@ def sentences(driven: DrivenModes) -> list[str]:
     parts = ["A constant pressure on a focus at rest has no line and drives no wave."]
     if driven.lines:
         parts = [_line_sentence(driven.lines[0])]
-    if not isfinite(driven.cut_on):
+    cut_on = min(mode.cut_on for mode in driven.curves.modes)
+    if not isfinite(cut_on):
         parts.append(f"No wave propagates up to {driven.curves.frequencies[-1]:.0f} Hz.")
-    elif driven.cut_on <= LOWEST:
+    elif cut_on <= LOWEST:
         parts.append(f"Waves propagate at all frequencies from {LOWEST:g} Hz.")
     else:
-        parts.append(f"No wave propagates below {driven.cut_on:.0f} Hz.")
+        parts.append(f"No wave propagates below {cut_on:.0f} Hz.")
     body = driven.scene.body
     if not (body.of_kind.is_layer or body.of_kind.is_plate):
         parts.append(
@@ -181,9 +153,9 @@ def sentences(driven: DrivenModes) -> list[str]:
 def _line_sentence(line: DrivenLine) -> str:
     start = f"The strongest line, {line.name} at {line.frequency:.0f} Hz, drives "
     decay = f"decays to 1/e in {significant(1e3 * line.decay_length)} mm"
-    if not line.is_wave:
-        return f"{start}no propagating wave; its evanescent motion ({line.mode.name}) {decay}."
-    wave = f"the {line.mode.name}" if " " in line.mode.name.strip("0123456789 ") else line.mode.name
+    if line.group_speed is None:
+        return f"{start}no propagating wave; its evanescent motion ({line.mode}) {decay}."
+    wave = f"the {line.mode}" if " " in line.mode.strip("0123456789 ") else line.mode
     text = (
         f"{start}mainly {wave} ({line.kind}). Its phase speed is {significant(line.phase_speed)} "
         f"m/s, its wavelength {significant(1e3 * line.phase_speed / line.frequency)} mm, and it "
@@ -200,9 +172,10 @@ def _line_sentence(line: DrivenLine) -> str:
 
 def page_parts(driven: DrivenModes, gallery: Gallery) -> list[Part]:
     """Return sentences, figure and table of the lines as parts of a page."""
-    lines = {line.name: line.frequency for line in driven.lines}
-    speed = driven.lines[0].focus_speed if driven.lines else 0.0
-    at = driven.lines[0].frequency if driven.lines else float(np.median(driven.curves.frequencies))
+    lines, speed = {line.name: line.frequency for line in driven.lines}, 0.0
+    at = float(np.median(driven.curves.frequencies))
+    if driven.lines:
+        speed, at = driven.lines[0].focus_speed, driven.lines[0].frequency
     figure = dispersion_figure(driven.curves, lines, speed, at, gallery.style)
     caption = (
         "Modes of the laterally infinite body. Strong lines: energy propagates. Pale lines: "
@@ -214,7 +187,15 @@ def page_parts(driven: DrivenModes, gallery: Gallery) -> list[Part]:
     shown: list[Part] = [" ".join(sentences(driven)), gallery.figure("dispersion", figure, caption)]
     if not driven.lines:
         return shown
-    rows = [line.row for line in driven.lines]
+    columns = (
+        "line", Column("frequency_hz", "frequency", "Hz", 4),
+        Column("pressure_pa", "pressure", "Pa"), Column("mode", "driven mode"), "kind",
+        Column("share", digits=2), Column("phase_speed_m_per_s", "phase speed", "m/s"),
+        Column("group_speed_m_per_s", "group speed", "m/s"),
+        Column("wavelength_mm", "wavelength", "mm"), Column("decay_length_mm", "1/e length", "mm"),
+        Column("focus_over_phase_speed", "focus over phase speed"),
+        Column("mach_angle_deg", "Mach angle", "degrees", 2),
+    )  # fmt: skip
     explained = (
         "The driven mode of a line moves the surface most at the edge of the main lobe of the "
         "focal spot. Evanescent modes count only if none propagates. Its share is its magnitude "
@@ -222,7 +203,8 @@ def page_parts(driven: DrivenModes, gallery: Gallery) -> list[Part]:
         "wave leaves a wake at the Mach angle asin(c/v). On a path as small as a wavelength, no "
         "such wake forms."
     )
-    return [*shown, Table(LINE_COLUMNS, rows, "driven-lines"), explained]
+    table = Table(columns, (line.row for line in driven.lines), "driven-lines")
+    return [*shown, table, explained]
 
 
 def write(folder: Path, driven: DrivenModes) -> None:

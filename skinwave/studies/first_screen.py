@@ -13,15 +13,10 @@ from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.planning.budget import ErrorBudget, error_budget
 from skinwave.planning.simulate import compute
+from skinwave.results import surface
 from skinwave.results.propagation import Propagation, added_lines, propagation, share_outside
 from skinwave.results.run import Run
-from skinwave.results.surface import (
-    SurfaceField,
-    body_map,
-    grid,
-    has_wavenumber_integral,
-    kernel_map,
-)
+from skinwave.results.surface import SurfaceField, has_wavenumber_integral, kernel_map
 from skinwave.results.views import View
 from skinwave.scene import paper15
 from skinwave.scene.keys import SCALES
@@ -37,12 +32,18 @@ Maps = tuple[SurfaceField, SurfaceField] | tuple[()]  # of a body and of the ker
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FirstScreen:
-    """Results on the first screen of a page: of one Tacton the runs of the kernel under the same
-    load and as published, and of bodies, and maps and views by column; effects of propagation by
-    Tacton and column. If known: smallest and largest share outside over the range of materials,
-    error budget of `body`, and measured places. `added` are the lines that a sheet which stretches
-    adds to those of its load in any Tacton, by column, and `checks` are runs of the flat slab that
-    is as deep as a body under the focus.
+    """Results on the first screen of a page.
+
+    Runs, maps by column and views are those of one Tacton. `kernel` has the load of the bodies.
+
+    Parameters
+    ----------
+    effects : effects of propagation by Tacton and column
+    added : by column, lines that a stretching sheet adds to those of its load in any Tacton
+    checks : by column, runs of the flat slab that is as deep as a body under the focus
+    shares : smallest and largest share outside over the range of materials, if known
+    budget : error budget of `body`, if known
+    measured : measured places, if any
     """
 
     kernel: Run
@@ -72,7 +73,7 @@ class FirstScreen:
 def effects_of(
     groups: Mapping[str, Sequence[Run]], maps_of: Callable[[Run], Maps]
 ) -> dict[str, dict[str, Propagation]]:
-    """Return the effect of propagation by Tacton and body, with maps as far as they are known."""
+    """Return the effect of propagation by Tacton and column, from maps if they are known."""
     effects: dict[str, dict[str, Propagation]] = {}
     for name, group in groups.items():
         if kernel := _run_of(group, SAME_LOAD.name):
@@ -136,15 +137,14 @@ def has_quick_map(scene: Scene) -> bool:
 
 def quick_maps(run: Run) -> Maps:
     """Return the maps of a body and of the kernel if they need no mesh."""
-    scene = run.scene
-    if not has_quick_map(scene):
+    if not has_quick_map(run.scene):
         return ()
-    return beside_kernel(scene, _meshless_map(scene, run.model))
+    return beside_kernel(run.scene, _meshless_map(run.scene, run.model))
 
 
-def beside_kernel(scene: Scene, surface: SurfaceField) -> tuple[SurfaceField, SurfaceField]:
+def beside_kernel(scene: Scene, own: SurfaceField) -> tuple[SurfaceField, SurfaceField]:
     """Return the map of a body and that of the kernel under its load, at the same places."""
-    return surface, kernel_map(scene.pressure, surface.x, surface.y)
+    return own, kernel_map(scene.pressure, own.x, own.y)
 
 
 def first_name(names: Iterable[str]) -> str:
@@ -156,7 +156,7 @@ def first_name(names: Iterable[str]) -> str:
 
 @lru_cache(maxsize=16)  # several parts of a page show the same scenes
 def _meshless_map(scene: Scene, model: str = "auto") -> SurfaceField:
-    return body_map(scene, *grid(scene), SolveOptions(model=model))
+    return surface.body_map(scene, *surface.grid(scene), SolveOptions(model=model))
 
 
 def _run_of(group: Sequence[Run], model: str) -> Run | None:
@@ -164,11 +164,11 @@ def _run_of(group: Sequence[Run], model: str) -> Run | None:
 
 
 def _shares(scene: Scene) -> tuple[float, float] | None:
-    """Return the smallest and largest share outside the kernel's region over the range of moduli
-    and losses of all materials, or None if none is uncertain.
+    """Return the smallest and largest share outside the kernel's region over the 90 % intervals of
+    moduli and losses of all materials, or None if none is uncertain.
     """
-    material, ends = "material", (0.05, 0.95)  # part of an uncertainty; ends of its 90 % interval
-    spreads = [each for each in spreads_of(scene) if each.part == material]
+    ends = (0.05, 0.95)
+    spreads = [each for each in spreads_of(scene) if each.part == "material"]
     if not spreads or not has_wavenumber_integral(scene):
         return None
     scenes = [scene]
@@ -179,6 +179,6 @@ def _shares(scene: Scene) -> tuple[float, float] | None:
             if each.key.endswith(scale)
         }
         scenes += [with_values(scene, values)] * bool(values)
-    kernel = kernel_map(scene.pressure, *grid(scene)).rms
+    kernel = kernel_map(scene.pressure, *surface.grid(scene)).rms
     shares = [share_outside(kernel, _meshless_map(each).rms) for each in scenes]
     return min(shares), max(shares)

@@ -36,8 +36,8 @@ class Outward:
 
 
 def outward(scene: Scene, body: Body, h: float) -> Outward | None:
-    """Return probes from the path towards the outermost probe, on a body whose curved surface is
-    meshed with elements of h in m; None if the path is at its edge.
+    """Return probes from the path towards the outermost probe, or None if the path is at the edge
+    of the body. A curved surface is meshed with elements of h in m.
 
     The line begins at the outermost point of the path, so that the distance along it is that from
     the path.

@@ -19,13 +19,13 @@ from skinwave.typing import Floats
 Effects = Mapping[str, Mapping[str, Propagation]]  # by Tacton and column
 NOT_SKIN = "thresholds are known of skin only"
 OF_PRESSURE = "none (a pressure)"
-HALF = "half of the motion within, from the path"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Number:
-    """A number of a Tacton on a body, in a `unit`; the value of the kernel, if it has one; and the
-    reason why a body may have none.
+    """A number of a Tacton on a body and of the kernel, in SI units; None if there is no value.
+
+    Pages show it times `factor`, in `unit`. `reason` says why a body may have no value.
     """
 
     name: str
@@ -33,37 +33,33 @@ class Number:
     of: Callable[[Propagation], float | None]
     of_kernel: Callable[[Propagation], float | None] = lambda effect: None
     reason: str = NOT_SKIN
-
-
-def _scaled(value: float | None, factor: float = 1e3) -> float | None:
-    return None if value is None else factor * value
+    factor: float = 1e3
 
 
 def _reach(effect: Propagation) -> float | None:
-    """Return the reach above threshold in mm; 0 if nothing exceeds it."""
+    """Return the reach above threshold in m; 0 if nothing exceeds it."""
     if not effect.above_threshold:
         return None
     once = effect.above_threshold[1]
-    return 1e3 * once.metre if once else 0.0
+    return once.metre if once else 0.0
 
 
 NUMBERS = (
     Number(
-        name=HALF, unit="mm", of=lambda e: _scaled(e.half),
-        of_kernel=lambda e: _scaled(e.kernel_half), reason="no map",
+        name="half of the motion within, from the path", unit="mm", of=lambda e: e.half,
+        of_kernel=lambda e: e.kernel_half, reason="no map",
     ),
     Number(
-        name=f"motion outside the kernel's {OUTSIDE:g} dB region", unit="%",
-        of=lambda e: _scaled(e.share, 100), of_kernel=lambda e: None if e.share is None else 0.0,
-        reason="no map",
+        name=f"motion outside the kernel's {OUTSIDE:g} dB region", unit="%", of=lambda e: e.share,
+        of_kernel=lambda e: None if e.share is None else 0.0, reason="no map", factor=100.0,
     ),
     Number(
-        name="highest sensation level at the probes", unit="dB",
+        name="highest sensation level at the probes", unit="dB", factor=1.0,
         of=lambda e: e.highest_sensation.level if e.highest_sensation else None,
     ),
     Number(name="reach above threshold, from the path", unit="mm", of=_reach),
     Number(
-        name="delay of the kernel's strongest line", unit="ms", of=lambda e: _scaled(e.delay),
+        name="delay of the kernel's strongest line", unit="ms", of=lambda e: e.delay,
         of_kernel=lambda e: 0.0, reason="too weak at the probes",
     ),
 )  # fmt: skip
@@ -75,13 +71,13 @@ def columns_of(effects: Effects) -> list[str]:
 
 
 def _values(effects: Effects, number: Number, column: str) -> Floats:
-    """Return a number of all Tactons that have it: on a body, or of the kernel."""
+    """Return a number of all Tactons that have it, on a body or of the kernel, in its unit."""
     if column == SAME_LOAD.name:
         each = ([number.of_kernel(e) for e in of_tacton.values()] for of_tacton in effects.values())
         found = (next((v for v in values if v is not None), None) for values in each)
     else:
         found = (number.of(each[column]) for each in effects.values() if column in each)
-    return np.array([value for value in found if value is not None])
+    return np.array([number.factor * value for value in found if value is not None])
 
 
 def _text(values: Floats, unit: str) -> str:
@@ -132,9 +128,7 @@ def figure(effects: Effects, style: Style) -> Figure:
 
 
 def sentences(effects: Effects, groups: Mapping[str, Sequence[Run]]) -> list[str]:
-    """Return why bodies differ from the kernel over all Tactons: where they move, and which line is
-    strongest.
-    """
+    """Return how bodies differ from the kernel over all Tactons, in place and strongest line."""
     columns = columns_of(effects)
     kernel = _values(effects, NUMBERS[0], SAME_LOAD.name)
     halves = {c: v for c in columns if len(v := _values(effects, NUMBERS[0], c))}
@@ -160,27 +154,21 @@ def sentences(effects: Effects, groups: Mapping[str, Sequence[Run]]) -> list[str
 
 
 def _gains(effects: Effects, groups: Mapping[str, Sequence[Run]], column: str) -> list[float]:
-    """Return, for Tactons whose strongest line on a body is not the kernel's, by how much more the
-    body answers the pressure of that line than that of the kernel's strongest line.
+    """Return, for each Tacton whose strongest line on a body is not the kernel's, how much more the
+    body amplifies the pressure of that line than that of the kernel's strongest line.
     """
     gains = []
     for tacton, each in effects.items():
-        runs = {run.column: run for run in groups[tacton]}
+        tables = {run.column: run.table.amplitudes for run in groups[tacton]}
         effect = each.get(column)
-        if effect is None or effect.strongest is None or effect.kernel_strongest is None:
+        if not (effect and effect.strongest and effect.kernel_strongest):
             continue
-        if SAME_LOAD.name not in runs:
-            continue
-        names = effect.strongest.name, effect.kernel_strongest.name
-        if names[0] != names[1]:
-            own, of_kernel = (_ratio(runs[c], *names) for c in (column, SAME_LOAD.name))
+        one, other = effect.strongest.name, effect.kernel_strongest.name
+        if one != other and SAME_LOAD.name in tables:
+            both = (tables[column], tables[SAME_LOAD.name])
+            own, of_kernel = (float(a[one].max() / a[other].max()) for a in both)
             gains.append(own / of_kernel)
     return gains
-
-
-def _ratio(run: Run, one: str, other: str) -> float:
-    """Return the ratio of two lines, each at the probe where it is strongest."""
-    return float(run.table.amplitudes[one].max() / run.table.amplitudes[other].max())
 
 
 def _listed(texts: Iterable[str]) -> str:

@@ -8,11 +8,11 @@ import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import starmap
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from matplotlib.figure import Figure
 from PIL import Image as Pillow
@@ -48,39 +48,27 @@ from skinwave.studies.first_screen import (
     with_kernels,
 )
 from skinwave.studies.surfaces import Found, Surface, Surfaces, quick_surface, views_of
-from skinwave.system.document import (
-    Choice,
-    Details,
-    Part,
-    Picture,
-    Report,
-    Section,
-    contents,
-    preformat,
-)
+from skinwave.system import document
+from skinwave.system.document import Choice, Details, Part, Picture, Report, Section
 from skinwave.system.effort import Progress, silent
 from skinwave.system.failures import or_failed
-from skinwave.system.table import Table
+from skinwave.system.table import Column, Table
 
 MARKS = "Black: path and focus; yellow: probes."
-T = TypeVar("T")
-AT_REST, SIDE_BY_SIDE = "at-rest", "side-by-side"  # names of pictures
-LOADS = (
-    "The published kernel has its published load: a linear drive and a sinc² main lobe. All "
-    "other models have the load of the scene."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gallery:
-    """Style of pictures, formats of figure files beside PNG, processes that draw, and pictures that
-    they have begun by name, from `begin_pictures`.
+    """How pictures are drawn: style, formats of figure files beside PNG, and processes that draw.
+
+    `at_rest` and `side_by_side` are the pixels of pictures that `begin_gallery` has begun.
     """
 
     style: Style = REPORT
     formats: Sequence[str] = ()
     workers: Executor | None = None
-    begun: "Mapping[str, Future[Any]]" = field(default_factory=dict)
+    at_rest: "Future[Any] | None" = None
+    side_by_side: "Future[Any] | None" = None
 
     def figure(self, name: str, figure: Figure, caption: str) -> Picture:
         """Return a figure with its files."""
@@ -99,7 +87,7 @@ class Gallery:
 
 
 def _compress(image: Pillow.Image) -> tuple[bytes, str]:
-    """Return a small file of a picture, and its format."""
+    """Return a small file of a picture, WebP if possible, and its format."""
     buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
     image.save(buffer, format=kind, quality=88, method=4)
     return buffer.getvalue(), kind
@@ -126,12 +114,12 @@ def page_of(
     Parameters
     ----------
     first : results of the first screen, if a body and both kernels were run
-    figures : runs that figures show, `groups` if not given
+    figures : runs that figures show, by default `groups`
     before, after : parts before and after the waveforms
     modelled : further parts of what was modelled
     command, notes : command that makes the page again, and notes on it
-    seconds : duration of all runs, the sum of their efforts if not given
-    failures : reasons of parts that failed; those of this page are added
+    seconds : duration of all runs, by default the sum of their efforts
+    failures : reasons of parts that failed; the page adds its own
     """
     runs = [run for group in groups.values() for run in group]
     failures = {} if failures is None else failures
@@ -142,8 +130,8 @@ def page_of(
     own = _first_parts(first, gallery) if first else []
     progress("draw maps", 0.5)
     spatial = _spatial_parts(first, gallery, failures) if first else []
-    shown = _body_parts(at_rest, gallery, failures)
-    body = [*before, *shown, *_waveforms(drawn, len(groups), progress), *after]
+    body = [*before, *_body_parts(at_rest, gallery, failures)]
+    body += [*_waveforms(drawn, len(groups), progress), *after]
     body += tables.claims_parts(evaluate(assessable_runs(runs)))
     effects = first.effects if first else effects_of(groups, lambda run: ())
     if effects:
@@ -151,18 +139,18 @@ def page_of(
     if is_single or not effects:
         lines = [part for group in groups.values() for part in tables.lines_table(group)]
         body.append(Details("Lines", lines))
-    models = [*description.model_paragraphs(runs), *modelled]
+    models: list[Part] = [*description.model_paragraphs(runs), *modelled]
     body.append(Details("What was modelled, and what was left out", models))
     if any(len(group) > 1 for group in groups.values()):
         agreement = tables.agreement_parts(groups, first.checks if first else {})
         body.append(Details("How far the models agree", agreement))
     effort = tables.effort_table(_efforts_by_body(runs), len(groups), seconds)
     body.append(Details("Errors and effort", effort))
-    again: list[Part] = [preformat(command)] if command else []
-    scene = [preformat(dumps(runs[-1].scene))] if is_single else []
+    again: list[Part] = [document.preformat(command)] if command else []
+    scene = [document.preformat(dumps(runs[-1].scene))] if is_single else []
     body.append(Details("The scene and the command", [*again, *notes, *scene]))
     caveats = [*description.quantity_notes(runs[-1].scene), *description.unresolved_lines(runs)]
-    parts: list[Part] = [contents(body), *caveats, *body]
+    parts: list[Part] = [document.contents(body), *caveats, *body]
     verdict: list[str] = []
     about_numbers = (
         "Medians over the Tactons, with the smallest and the largest value in brackets. In the "
@@ -181,29 +169,23 @@ def page_of(
             numbers = gallery.figure("numbers", dots, about_numbers)
             detail = Section(f"One of them: {first.kernel.tacton}", own)
             parts = [overview.table(effects), numbers, parts[0], *spatial, detail, *parts[1:]]
-    verdict = [" ".join(verdict)] if verdict else []
-    pictures = "pictures"  # folder of a page's figures
-    return Report(title, verdict, parts, efforts_of(runs), pictures, failures)
+    return Report(title, [" ".join(verdict)], parts, efforts_of(runs), "pictures", failures)
 
 
 def _begin_pictures(runs: Sequence[Run], gallery: Gallery) -> "dict[Run, Callable[[], Any]]":
-    """Return functions that return the pictures of bodies that were computed by elements, which
-    processes draw beside other work.
-    """
+    """Return functions of the pictures of bodies of elements, which processes draw meanwhile."""
     meshed = [run for run in runs if named(run.model).default_size]
-    if (begun := gallery.begun.get(AT_REST)) and renderer().is_available:
-        return dict.fromkeys(meshed, begun.result)
+    if gallery.at_rest:
+        return dict.fromkeys(meshed, gallery.at_rest.result)
     if gallery.workers and renderer().is_available:
         workers, style = gallery.workers, gallery.style
         return {run: workers.submit(_body_picture, run.scene, style).result for run in meshed}
     return {run: partial(_body_picture, run.scene, gallery.style) for run in meshed}
 
 
-def begin_pictures(
-    scene: Scene, moved: "Future[Found]", workers: Executor
-) -> "dict[str, Future[Any]]":
-    """Begin to draw a body at rest and, once its surface is there, the views of a scene, in a
-    process beside other work. Return their pixels by name, None without a renderer or views.
+def begin_gallery(scene: Scene, moved: "Future[Found]", workers: Executor) -> Gallery:
+    """Begin to draw a body at rest and, once its surface has moved, the views of a scene, in a
+    process beside other work. Their pixels are None without a renderer or views.
     """
     threads = ThreadPoolExecutor(2)
 
@@ -218,9 +200,11 @@ def begin_pictures(
             return None
         return workers.submit(render.picture, views, REPORT, views[-1].peak_frame).result()
 
-    begun = {AT_REST: threads.submit(at_rest), SIDE_BY_SIDE: threads.submit(side_by_side)}
+    gallery = Gallery(
+        workers=workers, at_rest=threads.submit(at_rest), side_by_side=threads.submit(side_by_side)
+    )
     threads.shutdown(wait=False)
-    return begun
+    return gallery
 
 
 def _body_picture(scene: Scene, style: Style) -> Any:
@@ -264,10 +248,9 @@ def write_run_page(
     folder: Path, run: Run, more: Sequence[Part] = (), command: str = "", *,
     gallery: Gallery, moved: "Future[Found] | None" = None, progress: Progress = silent,
 ) -> dict[str, str]:  # fmt: skip
-    """Write the folder of one run with its page, which may have more parts. Return the reasons of
-    parts that failed.
+    """Write the folder of one run with its page, and return the reasons of parts that failed.
 
-    `moved` is the surface of a body of elements, from `begin_surface`.
+    `more` are further parts of the page, `moved` is the surface from `begin_surface`.
     """
     fill(folder, run)
     first, failures = None, dict[str, str]()
@@ -310,13 +293,13 @@ def _drawn(groups: Mapping[str, Sequence[Run]], gallery: Gallery) -> Iterator[di
     files = dict(zip(groups, distinct_names(groups), strict=True))
     names = sorted(groups, key=lambda each: each != first_name(groups))
     draw = gallery.workers.map if gallery.workers else map
-    alone = replace(gallery, workers=None, begun={})
+    alone = Gallery(style=gallery.style, formats=gallery.formats)
     one = partial(_tacton_pictures, alone, len(groups) == 1)
     of_each = [(name, files[name], groups[name]) for name in names]
     return _or_here(draw(one, *zip(*of_each, strict=True)), partial(starmap, one, of_each))
 
 
-def _or_here(drawn: Iterable[T], here: Callable[[], Iterable[T]]) -> Iterator[T]:
+def _or_here(drawn: Iterable[Any], here: Callable[[], Iterable[Any]]) -> Iterator[Any]:
     """Yield what processes have drawn, or draw it here if one of them has ended."""
     try:
         yield from drawn
@@ -354,9 +337,12 @@ def _caption(name: str, runs: Sequence[Run]) -> str:
     tacton, columns = runs[0].scene.tacton, {run.column for run in runs}
     path = [] if tacton.trajectory.is_static else [description.path_text(tacton)]
     commanded = [*description.tone_texts(tacton), *path, *description.level_texts(tacton)]
-    waveforms = "Waveforms and spectra; each row is a probe."
-    text = f"{name}: {', '.join(commanded) or 'constant pressure'}. {waveforms}"
-    return f"{text} {LOADS}" if {PUBLISHED.name, SAME_LOAD.name} <= columns else text
+    loads = (
+        " The published kernel has its published load: a linear drive and a sinc² main lobe. All "
+        "other models have the load of the scene."
+    ) * ({PUBLISHED.name, SAME_LOAD.name} <= columns)
+    tones = ", ".join(commanded) or "constant pressure"
+    return f"{name}: {tones}. Waveforms and spectra; each row is a probe.{loads}"
 
 
 def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
@@ -388,15 +374,14 @@ def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
 
 
 def _spatial_parts(first: FirstScreen, gallery: Gallery, failures: dict[str, str]) -> list[Part]:
-    """Return the picture of the views at the instant when the body moves most, if there are any."""
+    """Return the picture of the views when the body moves most, if there are any views."""
     if not first.views:
         return []
     if not renderer().is_available:
         return [f"Three-dimensional pictures are left out: {renderer().detail}."]
     own = next((v for v in first.views if v.column == first.body.column), first.views[-1])
     with or_failed(failures, "picture in three dimensions"):
-        begun = gallery.begun.get(SIDE_BY_SIDE)
-        drawn = begun.result() if begun else None
+        drawn = gallery.side_by_side.result() if gallery.side_by_side else None
         return [side_by_side(first.views, own.peak_frame, gallery, drawn)]
     return []
 
@@ -411,7 +396,7 @@ def side_by_side(views: Sequence[View], frame: int, gallery: Gallery, drawn: Any
     )
     caption = f"{'; '.join(scales)}. Largest values: {', '.join(peaks)}. {MARKS} {compared}"
     pixels = render.picture(views, gallery.style, frame) if drawn is None else drawn
-    return gallery.image(SIDE_BY_SIDE, pixels, caption)
+    return gallery.image("side-by-side", pixels, caption)
 
 
 def _free_vibration(runs: Iterable[Run]) -> str:
@@ -455,17 +440,17 @@ def four_numbers(first: FirstScreen) -> Table:
             (f"reach above {NEAR:g} dB of the largest RMS, from the path",
              _distance(effects[0].kernel_spread), (_distance(each.spread) for each in effects)),
         ]  # fmt: skip
+    line = effects[0].kernel_strongest
+    of_line = f"{line.name} ({line.frequency:.0f} Hz)" if line else "the strongest line"
     rows += [
         (f"share of motion outside the kernel's {OUTSIDE:g} dB region",
          None if effects[0].share is None else "0 %", map(_share, effects)),
-        (f"delay of {_line_text(effects[0].kernel_strongest)}", "0 ms", map(_delay_text, effects)),
+        (f"delay of {of_line}", "0 ms", map(_delay_text, effects)),
     ]  # fmt: skip
-    name = f"{first.kernel.tacton}, same load"
-    bodies = [label(each.column) for each in effects]
-    if not first.maps:  # no map, and so no value of the kernel
-        return Table([name, *bodies], [[heading, *values] for heading, _, values in rows])
-    table = [[heading, kernel, *values] for heading, kernel, values in rows]
-    return Table([name, "point kernel", *bodies], table)
+    names = [f"{first.kernel.tacton}, same load", "point kernel"]
+    names += [label(each.column) for each in effects]
+    table = Table(names, [[heading, kernel, *values] for heading, kernel, values in rows])
+    return table if first.maps else table.only(names[0], *names[2:])  # the kernel has no value
 
 
 def _why_none(effect: Propagation) -> str:
@@ -564,20 +549,11 @@ def _share(effect: Propagation) -> str | None:
     return None if effect.share is None else percent(effect.share)
 
 
-def _millisecond(effect: Propagation) -> str | None:
-    return None if effect.delay is None else significant(1e3 * effect.delay, 2)
-
-
-def _line_text(component: Component | None) -> str:
-    """Return the name and the frequency of the line whose delay is given."""
-    return f"{component.name} ({component.frequency:.0f} Hz)" if component else "the strongest line"
-
-
 def _delay_text(effect: Propagation) -> str:
     """Return the phase delay, or why there is none."""
-    if (ms := _millisecond(effect)) is None:
+    if (delay := effect.delay) is None:
         return "none (too weak at the probes)"
-    return f"{ms} ms" + ", ahead of the kernel" * (effect.delay is not None and effect.delay < 0)
+    return f"{significant(1e3 * delay, 2)} ms" + ", ahead of the kernel" * (delay < 0)
 
 
 def _millimetre(reach: Reach | None) -> str | None:
@@ -585,25 +561,26 @@ def _millimetre(reach: Reach | None) -> str | None:
 
 
 def _distance(reach: Reach | None) -> str | None:
-    return None if reach is None else f"{_millimetre(reach)} mm"
+    return f"{_millimetre(reach)} mm" if reach else None
 
 
 def _effects_table(effects: Mapping[str, Mapping[str, Propagation]]) -> list[Part]:
     """Return a table of the effect of propagation, with a row for each Tacton and body."""
     rows = [
         [name, label(each.column), _share(each), _millimetre(each.kernel_spread),
-         _millimetre(each.spread), _millisecond(each), _component(each.kernel_strongest, PRESSURE),
-         _component(each.strongest), _sensation_text(each.highest_sensation)]
+         _millimetre(each.spread), None if each.delay is None else 1e3 * each.delay,
+         _component(each.kernel_strongest, PRESSURE), _component(each.strongest),
+         _sensation_text(each.highest_sensation)]
         for name, columns in effects.items()
         for each in columns.values()
     ]  # fmt: skip
-    columns = [
+    table = Table([
         "Tacton", "body", "share outside", "spread, kernel, mm", "spread, body, mm",
-        "phase delay of that component, ms", "strongest component, kernel",
+        Column("phase delay of that component", unit="ms", digits=2), "strongest component, kernel",
         "strongest component, body", "highest sensation level",
-    ]  # fmt: skip
-    known = [k for k in range(len(columns)) if any(row[k] is not None for row in rows)]
-    rows = [[row[k] for k in known] for row in rows]
+    ], rows)  # fmt: skip
+    cells = zip(table.columns, zip(*rows, strict=True), strict=True)
+    known = [column.name for column, own in cells if any(cell is not None for cell in own)]
     about_maps = (
         "Shares and spreads come from maps that reach 44 mm from the origin along x and y; areas "
         "and distances on a curved body are those along its surface. The map of a slab is that of "
@@ -611,4 +588,4 @@ def _effects_table(effects: Mapping[str, Mapping[str, Propagation]]) -> list[Par
         "phase delay, that of the kernel's strongest component, is known up to whole periods, and "
         "includes the phase lag of the body; below 0 the body is ahead."
     )
-    return [about_maps, Table([columns[k] for k in known], rows)]
+    return [about_maps, table.only(*known)]

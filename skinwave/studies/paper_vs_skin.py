@@ -27,23 +27,19 @@ from skinwave.system.document import Details, Picture, Report
 from skinwave.system.effort import Progress
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.table import Column, Table
-from skinwave.typing import Floats
-
-DURATION = 0.5  # s, of each Tacton; its later half is evaluated
-AMPLITUDES = (0.25, 0.5, 1.0)
-AM = 140.0  # Hz, of the Tacton whose amplitude is varied
-NEGLIGIBLE_RATIO = 1e-5  # of 2 f_AM to f_AM
 
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
     """Levels in dB re the strongest line of a run, by (Tacton, line) and mechanism; ratios of 2
-    f_AM to f_AM at `AMPLITUDES`, by mechanism; and reasons of failed runs.
+    f_AM to f_AM at the `amplitudes`, by mechanism; and reasons of failed runs.
     """
 
     levels: Mapping[tuple[str, str], Mapping[str, float]]
     ratios: Mapping[str, tuple[float, ...]]
+    amplitudes: tuple[float, ...]
     failures: Mapping[str, str] = field(default_factory=dict)
+    negligible_ratio: float = 1e-5  # of 2 f_AM to f_AM
 
 
 def paper_vs_skin(
@@ -52,13 +48,18 @@ def paper_vs_skin(
     h: float | None = None,
     patterns: Iterable[tuple[str, Tacton]] | None = None,
     bodies: Mapping[str, Body] | None = None,
+    duration: float = 0.5,
+    amplitudes: tuple[float, ...] = (0.25, 0.5, 1.0),
+    am_frequency: float = 140.0,
 ) -> Findings:
-    """Run Tactons (default: the paper's 15) through the mechanisms on bodies (default: paper sheet
-    and skin slab), with solid elements of size h in m.
+    """Run Tactons by each mechanism on bodies, with solid elements of size h in m.
+
+    By default these are the paper's 15 Tactons on `paper15.MEASURED_ON`. Of the `duration` in s the
+    later half is evaluated. A Tacton at rest with `am_frequency` in Hz has several `amplitudes`.
     """
     bodies = bodies or {name: BODIES[name] for name in MEASURED_ON}
-    chosen = [(n, replace(t, duration=DURATION)) for n, t in (patterns or tactons())]
-    still = Tacton(am_frequency=AM, duration=DURATION, trajectory=Trajectory())
+    chosen = [(n, replace(t, duration=duration)) for n, t in (patterns or tactons())]
+    still = Tacton(am_frequency=am_frequency, duration=duration, trajectory=Trajectory())
     levels: dict[tuple[str, str], dict[str, float]] = {}
     ratios: dict[str, tuple[float, ...]] = {}
     failures: dict[str, str] = {}
@@ -73,12 +74,13 @@ def paper_vs_skin(
                 with or_failed(failures, f"{name} on {mechanism}"):
                     for line, level in _levels(*settled(tacton)).items():
                         levels.setdefault((name, line), {})[mechanism] = level
-            scaled = (replace(still, amplitude=amplitude) for amplitude in AMPLITUDES)
+            scaled = [replace(still, amplitude=amplitude) for amplitude in amplitudes]
             with or_failed(failures, f"ratios of {mechanism}"):
-                ratios[mechanism] = tuple(_ratio(settled(tacton)[1]) for tacton in scaled)
+                both = (lines(settled(t)[1], [am_frequency, 2 * am_frequency]) for t in scaled)
+                ratios[mechanism] = tuple(float(twice[0] / once[0]) for once, twice in both)
     if not levels:
         raise ValueError(failure_text(failures))
-    return Findings(levels=levels, ratios=ratios, failures=failures)
+    return Findings(levels=levels, ratios=ratios, amplitudes=amplitudes, failures=failures)
 
 
 Settled = Callable[[Tacton], tuple[MovingPressure, Response]]
@@ -129,33 +131,29 @@ def _levels(pressure: MovingPressure, later: Response) -> dict[str, float]:
     return {name: float(level) for name, level in zip(names, levels, strict=True)}
 
 
-def _ratio(later: Response) -> float:
-    once, twice = lines(later, [AM, 2 * AM])[:, 0]
-    return float(twice / once)
-
-
 def load_ratios() -> dict[str, tuple[float, ...]]:
-    """Return the amplitudes at 2f, 3f and 4f relative to that at f, for each law of the load."""
-    m = np.sin(2 * np.pi * (np.arange(4096) + 0.5) / 4096)
-    # Loads over one period of the modulation m = sin, relative to the largest. Each has its own
-    # ratios 2f/f, 3f/f and 4f/f, before the response of the body changes them.
-    by_name: Mapping[str, Callable[[Floats], Floats]] = {
-        "force follows the command, with a mean": lambda m: (1 + m) / 2,
-        "square of the sound's amplitude": lambda m: ((1 + m) / 2) ** 2,
-        "contact on one side only": lambda m: np.maximum(m, 0),
-        "clipped sound, squared": lambda m: np.maximum(m, 0) ** 2,
-        "square root of the command": lambda m: np.sqrt((1 + m) / 2),
+    """Return the amplitudes at 2f, 3f and 4f relative to that at f, for each law of the load.
+
+    The response of a body changes these ratios.
+    """
+    m = np.sin(2 * np.pi * (np.arange(4096) + 0.5) / 4096)  # one period of the modulation
+    loads = {
+        "force follows the command, with a mean": (1 + m) / 2,
+        "square of the sound's amplitude": ((1 + m) / 2) ** 2,
+        "contact on one side only": np.maximum(m, 0),
+        "clipped sound, squared": np.maximum(m, 0) ** 2,
+        "square root of the command": np.sqrt((1 + m) / 2),
     }
-    spectra = {name: np.abs(np.fft.rfft(load(m))) for name, load in by_name.items()}
+    spectra = {name: np.abs(np.fft.rfft(load)) for name, load in loads.items()}
     return {name: tuple((a[2:5] / a[1]).tolist()) for name, a in spectra.items()}
 
 
 def sentences(findings: Findings) -> list[str]:
     """Return conclusions: explained lines, unexplained lines, and the deciding experiment."""
-    parts, low = [], f"{100 * AMPLITUDES[0]:.0f}"
+    parts, low = [], f"{100 * findings.amplitudes[0]:.0f}"
     negligible_change = 1e-3  # relative, of a ratio over the amplitudes
     for mechanism, ratios in findings.ratios.items():
-        if max(ratios) < NEGLIGIBLE_RATIO:
+        if max(ratios) < findings.negligible_ratio:
             parts.append(f"{mechanism}: no 2 f_AM at any amplitude.")
         elif max(ratios) < (1 + negligible_change) * min(ratios):
             parts.append(
@@ -179,17 +177,17 @@ def sentences(findings: Findings) -> list[str]:
 def report(findings: Findings) -> Report:
     """Return the page: conclusions, ratio over amplitude, lines by mechanism, patterns of loads."""
     caption = "Ratio of 2 f_AM to f_AM at the focus over the amplitude of the drive."
-    by_mechanism = [Column(each, unit="dB", digits=2) for each in findings.ratios]
+    weakest = -100.0  # dB re the strongest line of a run: weaker lines are round-off
+    strong = {
+        key: {name: level for name, level in own.items() if level > weakest}
+        for key, own in findings.levels.items()
+    }
     levels = Table(
-        ["Tacton", "line", *by_mechanism],
-        [
-            [*key, *(_strong_level(own, each) for each in findings.ratios)]
-            for key, own in findings.levels.items()
-        ],
-        name="lines",
-    )
+        ["Tacton", "line", *(Column(each, unit="dB", digits=2) for each in findings.ratios)],
+        [[*key, *map(own.get, findings.ratios)] for key, own in strong.items()], name="lines",
+    )  # fmt: skip
     ratios = Table(
-        ["mechanism", *(f"{100 * each:.0f} %" for each in AMPLITUDES)],
+        ["mechanism", *(f"{100 * each:.0f} %" for each in findings.amplitudes)],
         [[mechanism, *own] for mechanism, own in findings.ratios.items()], name="ratios",
     )  # fmt: skip
     patterns = Table(
@@ -201,7 +199,7 @@ def report(findings: Findings) -> Report:
         verdict=conclusions[-2:],
         parts=[
             *conclusions[:-2],
-            Picture(png(ratio_figure(findings), dpi=130), caption, name="amplitude"),
+            Picture(png(_figure(findings), dpi=130), caption, name="amplitude"),
             Details("2 f_AM over f_AM by amplitude", [ratios]),
             Details("Lines by mechanism", [levels]),
             Details("Patterns of loads", [patterns]),
@@ -210,23 +208,17 @@ def report(findings: Findings) -> Report:
     )  # fmt: skip
 
 
-def _strong_level(levels: Mapping[str, float], mechanism: str) -> float | None:
-    level = levels.get(mechanism, -np.inf)
-    weakest = -100.0  # dB re the strongest line of a run: weaker lines are round-off
-    return level if level > weakest else None
-
-
-def ratio_figure(findings: Findings) -> Figure:
+def _figure(findings: Findings) -> Figure:
     """Draw 2 f_AM / f_AM over amplitude for each mechanism that has the line."""
     figure = Figure(figsize=(7, 4), layout="constrained")
     axes = figure.add_subplot()
     names = {label(name): name for name in BODIES}
-    curves = {m: own for m, own in findings.ratios.items() if max(own) > NEGLIGIBLE_RATIO}
+    curves = {m: r for m, r in findings.ratios.items() if max(r) > findings.negligible_ratio}
     for mechanism, own in curves.items():
         body, _, cause = mechanism.partition(": ")
         name = names.get(body, body)
         axes.plot(
-            [100 * each for each in AMPLITUDES], own, marker=marker(name), color=colour(name),
+            100 * np.array(findings.amplitudes), own, marker=marker(name), color=colour(name),
             linestyle="--" if "stretching" in cause else "-", label=mechanism,
         )  # fmt: skip
     axes.set(xlabel="amplitude of the drive, %", ylabel=r"$2 f_{AM}$ / $f_{AM}$", yscale="log")

@@ -15,6 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from simple_model import Effort, MovingPressure, Response, lines, resolved_lines, sensation_level
@@ -31,6 +32,7 @@ from skinwave.planning.simulate import compute
 from skinwave.report.figures import png
 from skinwave.report.palette import BLUE
 from skinwave.results.comparison import compare
+from skinwave.results.files import write_responses
 from skinwave.results.propagation import Reach
 from skinwave.results.run import ASSESSED
 from skinwave.scene.scene import Body, Scene, check_motion
@@ -55,7 +57,6 @@ from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
 HIGHEST = 600.0  # Hz, of the lines that are compared
-NEGLIGIBLE_TIME = 0.05  # s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,10 +81,12 @@ class HierarchyStep:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """Effect of dropping one assumption: largest change of a waveform relative to the strongest
-    probe, its probe (x, y) in m, increase of sensation level and lines in dB, reach above
-    threshold with and without the assumption, change of the waveform if only this assumption is
-    made, and additional seconds.
+    """Effect of dropping one assumption.
+
+    `waveform` is the largest change of a waveform, relative to the strongest probe, and `where` the
+    probe (x, y) in m with this change. `level` and `decibel` are increases in dB of the sensation
+    level and of lines, `reach` is that above threshold with and without the assumption. `alone` is
+    the change of the waveform if only this assumption is made, `seconds` the additional time.
     """
 
     name: str
@@ -98,8 +101,8 @@ class Effect:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hierarchy:
-    """Model hierarchy: steps from the published to the richest model, side steps, which drop one
-    more assumption than the step where they branch off, and leave-one-out models.
+    """Model hierarchy: steps from the published to the richest model, side steps and leave-one-out
+    models. A side step drops one more assumption than the step where it branches off.
     """
 
     scene: Scene
@@ -152,9 +155,9 @@ def hierarchy_of(
 ) -> Hierarchy:
     """Compute a scene at every step of the model hierarchy.
 
-    Elements have the size h in m, by default `LARGER` times that of the body. `update_rate` and
-    `points` are those of `device_path`. Raises a ValueError if the scene has no body, its probes do
-    not read the displacement of the surface, or no such device exists.
+    Elements have the size h in m, by default that of `element_size`. `update_rate` and `points` are
+    those of `device_path`. Raises a ValueError if the scene has no body, if its probes do not read
+    the displacement of the surface, or if no such device exists.
     """
     check_motion(scene, "relax")
     if isinstance(scene.pressure.profile, SpotMap):
@@ -220,9 +223,10 @@ def hierarchy_of(
 def _with_shared_models(
     steps: Sequence[HierarchyStep], scenes: Sequence[Scene], count: int
 ) -> list[HierarchyStep]:
-    """Return the steps with one model for each solid, where it takes the load: that of the last of
-    the first `count` steps on this body. Then both responses whose difference is the effect of a
-    load have the error of elements.
+    """Return the steps with one model for each solid, where it takes the load.
+
+    It is the model of the last of the first `count` steps on this body. Both responses whose
+    difference is the effect of a load then have the error of elements.
     """
     solids = [s for s in steps if s.body and s.body.is_solid and named(s.model).needs_body]
     last = {step.body: step.model for step in steps[:count] if step in solids}
@@ -247,9 +251,7 @@ def _outward(scene: Scene, body: Body, h: float) -> Outward | None:
 def _time(
     scene: Scene, more: tuple[tuple[float, float], ...], model: str, h: float | None, cache: str
 ) -> tuple[Response, float, int]:
-    """Return a response at the probes of a scene and at `more`, its seconds and the peak memory of
-    its process.
-    """
+    """Return a response at the scene's probes and at `more`, its seconds, and the peak memory."""
     os.environ["SKINWAVE_CACHE"] = cache
     started = time.perf_counter()
     response = compute(replace(scene, probes=(*scene.probes, *more)), model, h=h)
@@ -381,20 +383,22 @@ def sentence(e: Effect) -> str:
 
 
 def _change_text(e: Effect) -> str:
-    x, y = (1e3 * v for v in e.where)
-    changes = [
-        f"the waveform at ({x:g}, {y:g}) mm changes by "
-        f"{share_of(e.waveform, 'the motion of the strongest probe')}"
-    ]
+    share = share_of(e.waveform, "the motion of the strongest probe")
+    changes = [f"the waveform at {_place(e)} mm changes by {share}"]
     if e.level is not None:
         changes.append(f"the sensation level by {decibel(e.level, signed=True)} dB")
     with_it, without_it = map(_reach_text, e.reach)
     if with_it != without_it:
         changes.append(f"the reach above threshold from {with_it} to {without_it} mm")
-    time = "no extra time" if e.seconds <= NEGLIGIBLE_TIME else f"{e.seconds:.1f} s more"
+    time = f"{e.seconds:.1f} s more" if e.seconds > 0.05 else "no extra time"  # which rounds to 0
     *first, last = changes
     text = f"{', '.join(first)}, and {last}" if first else last
     return f"{text}. Then {ASSUMPTIONS[e.name]}, which takes {time}."
+
+
+def _place(e: Effect) -> str:
+    x, y = e.where
+    return f"({1e3 * x:g}, {1e3 * y:g})"
 
 
 def _reach_text(reach: Reach | None) -> str:
@@ -422,10 +426,7 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
     )  # fmt: skip
     (folder / "relax.csv").write_bytes(Table(line_columns, _line_rows(hierarchy)).to_csv())
     responses = {step.name: step.response for step in hierarchy.every if step.response}
-    arrays = {name: response.values for name, response in responses.items()}
-    first = next(iter(responses.values()))
-    arrays |= {"t": first.times, "probes": first.probes}
-    np.savez(folder / "responses.npz", **arrays)  # type: ignore[arg-type]
+    write_responses(folder / "responses.npz", responses)
     verdict = "No two steps can be compared, because too many failed."
     if effects:
         unknown = unknown_text(hierarchy, effects)
@@ -434,10 +435,17 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
             f"'{effects[0].name}' has the largest effect: without it, {_change_text(effects[0])}"
         )
     effect_columns = (
-        "assumption", "waveform_percent", "at_mm", "level_db", "reach_with_mm", "reach_without_mm",
-        "alone_percent", "costs_s", "lines_db",
+        Column("assumption", "dropped assumption"),
+        Column("waveform_percent", "change of the waveform", "%", 2), Column("at_mm", "at", "mm"),
+        Column("level_db", "change of the sensation level", "dB", 2),
+        Column("reach_with_mm", "reach above threshold with it", "mm"),
+        Column("reach_without_mm", "without it", "mm"),
+        Column("alone_percent", "change if no other assumption is made", "%", 2),
+        Column("costs_s", "extra time", "s", 2), Column("line", "largest change of a line"),
+        "lines_db",
     )  # fmt: skip
-    (folder / "effects.csv").write_bytes(Table(effect_columns, map(_effect_row, effects)).to_csv())
+    table = Table(effect_columns, map(_effect_row, effects))
+    (folder / "effects.csv").write_bytes(table.to_csv())
     step_columns = (
         "step", "model", Column("dofs", "degrees of freedom"),
         Column("seconds", "time", "s", digits=2), Column("memory_gib", "memory", "GiB", digits=2),
@@ -453,15 +461,9 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
         "strongest probe; and, on skin, the highest sensation level at a probe, and the distance "
         "from the path up to which a line exceeds the detection threshold."
     )
-    page_columns = (
-        "dropped assumption", Column("change of the waveform", digits=2), "at, mm",
-        Column("change of the sensation level", unit="dB", digits=2), "reach above threshold, mm",
-        Column("change if no other assumption is made", digits=2), "largest change of a line",
-        Column("extra time", unit="s", digits=2),
-    )  # fmt: skip
     parts: list[Part] = [
         Picture(png(_figure(effects, hierarchy.towards), dpi=130), bars, "relax"),
-        Table(page_columns, map(_page_row, effects)),
+        table.only(*(column.name for column in table.columns if column.name != "lines_db")),
         Details("Steps and their warnings", [
             introduction, steps, warnings_banner(hierarchy.efforts),
         ]),
@@ -479,18 +481,21 @@ def _figure(effects: list[Effect], towards: str) -> Figure:
     figure = Figure(figsize=(4 + 3 * panels, 1.2 + 0.34 * len(effects)), layout="constrained")
     first, *others = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
     rows = np.arange(len(effects))
+
+    def draw_bars(axes: Axes, lengths: Sequence[float], texts: Sequence[str]) -> None:
+        bars = axes.barh(rows, lengths, color=BLUE, height=0.7)
+        axes.bar_label(bars, texts, padding=4, fontsize=9)
+
     changes = [e.waveform for e in effects]
-    bars = first.barh(rows, changes, color=BLUE, height=0.7)
-    first.bar_label(bars, [significant(x, 2) for x in changes], padding=4, fontsize=9)
+    draw_bars(first, changes, [significant(x, 2) for x in changes])
     first.set_yticks(rows, [e.name.replace("^2", "²") for e in effects])
     first.invert_yaxis()
     first.set_xlim(0, 1.2 * max(changes, default=0.0) or 1.0)
     first.set_xlabel("change of the waveform\nover the motion of the strongest probe")
     if is_skin:
         axes, levels = others[0], [e.level or 0.0 for e in effects]
-        bars = axes.barh(rows, levels, color=BLUE, height=0.7)
         texts = ["" if e.level is None else decibel(e.level, signed=True) for e in effects]
-        axes.bar_label(bars, texts, padding=4, fontsize=9)
+        draw_bars(axes, levels, texts)
         axes.axvline(0, color="black", linewidth=0.8)
         axes.margins(x=0.3)
         axes.set_xlabel("change of the\nsensation level, dB")
@@ -515,18 +520,11 @@ def _figure(effects: list[Effect], towards: str) -> Figure:
 
 def _effect_row(e: Effect) -> list[object]:
     return [
-        e.name, 100 * e.waveform, f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})", e.level,
+        e.name, 100 * e.waveform, _place(e), e.level,
         *(_reach_text(r) if any(e.reach) else None for r in e.reach),
-        None if e.alone is None else 100 * e.alone, e.seconds,
+        None if e.alone is None else 100 * e.alone, e.seconds, _line_change(e.decibel),
         ", ".join(f"{name} {decibel(x, signed=True)}" for name, x in e.decibel.items()),
     ]  # fmt: skip
-
-
-def _page_row(e: Effect) -> list[object]:
-    where = f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})"
-    seconds = e.seconds if e.seconds > NEGLIGIBLE_TIME else None
-    reach = " to ".join(map(_reach_text, e.reach)) if any(e.reach) else None
-    return [e.name, e.waveform, where, e.level, reach, e.alone, _line_change(e.decibel), seconds]
 
 
 def _step_row(step: HierarchyStep) -> list[object]:

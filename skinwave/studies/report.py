@@ -1,15 +1,13 @@
 """The report of a scene, one page with its pictures and data, and the page of a map."""
 
 import io
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Future
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 from PIL import Image as Pillow
@@ -78,7 +76,10 @@ def _page(
     before = [*picture_parts(album, gallery, progress, failed), *map_parts(album, gallery)]
     progress("write data", 0.0)
     _write_data(out / "data", album)
-    groups = {name: _with_kernels(runs) for name, runs in album.groups.items()}
+    groups: dict[str, Sequence[Run]] = {}
+    for name, runs in album.groups.items():  # both point kernels are computed again
+        bodies = [run for run in runs if run.is_motion]
+        groups[name] = [*with_kernels(bodies[0])[:2], *bodies] if bodies else runs
     scene = Details("The scene in words", [Table(["", ""], description.scene_rows(album.scene))])
     drawn_with = renderer().detail if renderer().is_available else "none"
     return page_of(
@@ -93,22 +94,25 @@ def picture_parts(
     album: Album, gallery: Gallery, progress: Progress, failures: dict[str, str]
 ) -> list[Part]:
     """Return parts of a page that show the views, or say why there are none."""
-    views = list(album.views.values())
-    no_views = (
-        "These results contain no motion of whole bodies, so that there is no picture of a "
-        "surface. skinwave report SCENE computes it."
-    )
-    if not views:
-        return [no_views]
+    if not (views := list(album.views.values())):
+        return [
+            "These results contain no motion of whole bodies, so that there is no picture of a "
+            "surface. skinwave report SCENE computes it."
+        ]
     of_scene = [v for v in views if v.scene.body == album.scene.body and v.quantity.of_body]
     own = (of_scene or views)[-1]
-    frame = own.peak_frame
-    options: dict[str, Any] = {}
+    options: dict[str, Part] = {}
     missing: list[Part] = []
-    if renderer().is_available:
-        options = _spatial_parts(own, frame, views, gallery, progress, failures)
-    else:
+    draw_film: Callable[[], Picture] | None = None
+    if not renderer().is_available:
         missing = [f"Three-dimensional pictures and the film are left out: {renderer().detail}."]
+    else:
+        if gallery.workers:  # copies, because a view keeps what it computes while a thread sends it
+            copies = replace(own), [replace(view) for view in views]
+            draw_film = gallery.workers.submit(_film, *copies, gallery.style, silent).result
+        else:
+            draw_film = partial(_film, own, views, gallery.style, progress)
+        options = _spatial_parts(own, views, gallery, progress, failures)
     progress("draw snapshots", 0.0)
     figure = maps.snapshots_figure(views, gallery.style)
     snapshots = (
@@ -119,39 +123,29 @@ def picture_parts(
     )
     options["snapshots"] = gallery.figure("snapshots", figure, snapshots)
     progress("draw snapshots", 0.5)
-    if isinstance(drawn := options.get("film"), Future):
+    if draw_film:
         progress("film", 0.0)
         with or_failed(failures, "film"):
-            options["film"] = drawn.result()
-        if "film" in failures:
-            del options["film"]
+            options["film"] = draw_film()
     turned_caption = (
         "Turn it with the mouse, a finger or the arrow keys. Colour: motion about its mean, red "
         "into the body, blue out of it. If the legend has ≥, larger values have the end colour. "
         "Black: path and focus; orange: probes."
     )
-    turned = inner_page(turntable(own, frame), f"{label(own.column)}. {turned_caption}")
-    return [Section("Pictures", [*missing, Choice("pictures", options), turned])]
+    turned = inner_page(turntable(own, own.peak_frame), f"{label(own.column)}. {turned_caption}")
+    order = ("side by side", "film", "cut open", "snapshots")
+    pictures = Choice("pictures", {name: options[name] for name in order if name in options})
+    return [Section("Pictures", [*missing, pictures, turned])]
 
 
 def _spatial_parts(
-    own: View, frame: int, views: Sequence[View], gallery: Gallery, progress: Progress,
-    failures: dict[str, str],
-) -> dict[str, Any]:  # fmt: skip
-    """Return three-dimensional pictures at a frame, and the film, without those that fail. With
-    workers, the film is drawn beside them.
-    """
-    parts: dict[str, Any] = {}
-    workers, style = gallery.workers, gallery.style
-    beside = None
-    if workers:  # copies, because the originals keep what they compute while a thread sends them
-        copies = replace(own), [replace(view) for view in views]
-        beside = workers.submit(_film, *copies, style, silent)
+    own: View, views: Sequence[View], gallery: Gallery, progress: Progress, failures: dict[str, str]
+) -> dict[str, Part]:
+    """Return three-dimensional pictures by name, without those that fail."""
+    parts: dict[str, Part] = {}
     progress("draw side by side", 0.0)
     with or_failed(failures, "picture side by side"):
-        parts["side by side"] = side_by_side(views, frame, gallery)
-    with or_failed(failures, "film"):
-        parts["film"] = beside or _film(own, views, style, progress)
+        parts["side by side"] = side_by_side(views, own.peak_frame, gallery)
     if not len(own.tets):
         return parts
     with or_failed(failures, "picture cut open"):
@@ -169,7 +163,7 @@ def _spatial_parts(
 
 
 def _film(own: View, views: Sequence[View], style: Style, progress: Progress) -> Picture:
-    """Return the film, on the page as WebP if possible, a third of the size of GIF."""
+    """Return the film as GIF; the page shows WebP if possible, a third of its size."""
     count = len(own.times)
     slower = significant(duration(count) / own.period, 2)
     caption = f"Film: {played_text(own)}. {count} frames, slowed down {slower} times."
@@ -204,12 +198,6 @@ def _map_caption(scene: Scene) -> str:
     return f"{maps.rms_text(scene.pressure)} {map_caption}"
 
 
-def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
-    """Return the runs of one Tacton and of both point kernels, which are computed again."""
-    bodies = [run for run in runs if run.is_motion]
-    return [*with_kernels(bodies[0])[:2], *bodies] if bodies else runs
-
-
 def _maps(album: Album, run: Run) -> Maps:
     """Return a body's saved map, and the kernel's."""
     view, field = album.views.get(run.column), album.maps.get(run.column)
@@ -232,14 +220,14 @@ def _write_data(folder: Path, album: Album) -> None:
 
 
 def _plan_parts(album: Album) -> list[Part]:
-    """Return the plan of the response, and the difference between pictures and response."""
+    """Return the plan of the response, and by how much the pictures differ from it."""
     if (planned := album.planned) is None:
         return ["These results contain no plan. skinwave plan SCENE makes one."]
     heading = (
         f"Plan for a relative error of {100 * planned['tolerance']:g} % at the probes. Pictures "
         "show the whole body, by finite elements (sheets: by plate modes)."
     )
-    rows = [[row["what"], row["value"], row["reason"]] for row in planned["rows"]]
+    rows = [[row[name] for name in ("what", "value", "reason")] for row in planned["rows"]]
     parts: list[Part] = [heading, Table(["", "", "reason"], rows)]
     if "misfit" in planned:
         parts.append(

@@ -11,13 +11,8 @@ from pathlib import Path
 from simple_model import Effort, Response
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.live import html_file
-from skinwave.measure.comparison import (
-    Measured,
-    compare_measured,
-    in_quantity,
-    measured_places,
-    runs_to_draw,
-)
+from skinwave.measure import comparison as measuring
+from skinwave.measure.comparison import Measured
 from skinwave.models import named
 from skinwave.models.limits import check_takes
 from skinwave.models.linear_elements import FEM
@@ -31,18 +26,11 @@ from skinwave.results.files import write_lines, write_responses, write_run
 from skinwave.results.run import Run
 from skinwave.scene import paper15
 from skinwave.scene.scene import Body, Scene
+from skinwave.studies import surfaces
 from skinwave.studies.album import scene_columns
 from skinwave.studies.first_screen import Maps, first_name, first_screen, has_quick_map, quick_maps
 from skinwave.studies.pages import Gallery, efforts_of, page_of
-from skinwave.studies.surfaces import (
-    Part,
-    Surfaces,
-    element_surfaces,
-    flat_run,
-    played,
-    quick_surface,
-    views_of,
-)
+from skinwave.studies.surfaces import Part, Surfaces
 from skinwave.system import document
 from skinwave.system.effort import Progress, one_thread, peak_memory, silent
 from skinwave.system.failures import failure_text, or_failed
@@ -58,8 +46,8 @@ Scenes = Mapping[str, Mapping[str, Scene]]  # Tacton -> column -> scene
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOutcome:
-    """Outcome of a comparison: number of finished and of `planned` runs, failed parts, and
-    conclusions on the agreement with a measurement.
+    """Outcome of a comparison: numbers of finished `runs` and of `planned` ones, reasons of failed
+    parts, and conclusions on the agreement with a measurement.
     """
 
     assessed_claims: list[AssessedClaim]
@@ -103,17 +91,17 @@ def run_study(
     """Run every scene, write each run when it is finished, then write tables and page.
 
     Each body has one model: the given one, finite elements if their size is given, or the most
-    complete one that plans choose for its scenes. A body of one scene is planned as by `run`; one
-    of several has elements of the given size, of that in `paper15.SIZES`, or of the default size. A
-    measurement is compared with the models of its Tacton. `live` are the scenes of a live page.
-    After an interrupt or a failure, the other runs are compared and written; raises a ValueError if
-    all fail.
+    complete one that plans choose for its scenes. A body of one scene is planned as by `run`. A
+    body of several scenes has elements of the given size, of that in `paper15.SIZES`, or of the
+    default size. A measurement is compared with the models of the only Tacton. `live` are the
+    scenes of a live page. After an interrupt or a failure, the other runs are compared and written.
+    Raises a ValueError if all fail.
     """
     models = _models(scenes, options)
     started, planned = time.perf_counter(), sum(map(len, scenes.values()))
     progress = options.progress
     groups: dict[str, list[Run]] = {}
-    found, interrupted = Found(), True
+    found, interrupted = BesideRuns(), True
     failed = found.failures
     options = replace(options, model="auto", progress=silent)
     about = (
@@ -142,11 +130,11 @@ def run_study(
         assessed_claims = evaluate(assessable_runs(runs))
         write_claims(folder / "claims.csv", assessed_claims)
         write_lines(folder / "lines.csv", runs)
-        by_name = {f"{r.tacton}/{r.body}/{r.model}": r for r in runs}
+        by_name = {f"{r.tacton}/{r.body}/{r.model}": r.response for r in runs}
         write_responses(folder / "responses.npz", by_name)
         first = None
         if not interrupted:
-            views = views_of(scenes[first_name(scenes)], found.surfaces)
+            views = surfaces.views_of(scenes[first_name(scenes)], found.surfaces)
             first = first_screen(groups, found.maps, views, found.checks)
         parts: list[document.Part] = []
         with or_failed(failed, "live page"):
@@ -157,23 +145,23 @@ def run_study(
                 parts.append(document.live_link(live_file))
         figures: dict[str, Sequence[Run]] = dict(groups)
         conclusions: list[str] = []
-        for name, group in groups.items() if measured else ():
+        if measured:
             from skinwave.measure import comparison_page  # slow to import
 
-            assert measured
+            ((name, group),) = groups.items()
             quantity = measured.measurement.quantity
-            comparison = compare_measured(
-                measured, [in_quantity(run, quantity, found.prepared) for run in group]
+            comparison = measuring.compare_measured(
+                measured, [measuring.in_quantity(run, quantity, found.prepared) for run in group]
             )
             conclusions += [comparison_page.conclusion(comparison, c) for c in comparison.bodies]
             comparison_page.write_tables(folder, comparison)
             parts.append(comparison_page.page_section(comparison, Gallery().figure))
-            figures[name] = runs_to_draw(comparison)
-            first = replace(first, measured=measured_places(comparison)) if first else None
+            figures[name] = measuring.runs_to_draw(comparison)
+            places = measuring.measured_places(comparison)
+            first = replace(first, measured=places) if first else None
         if interrupted:
-            parts.insert(
-                0, f"Interrupted: this page shows the {len(runs)} finished of {planned} runs."
-            )
+            said = f"Interrupted: this page shows the {len(runs)} finished of {planned} runs."
+            parts.insert(0, said)
         gallery = Gallery(workers=None if interrupted else workers)
         page_of(
             title, groups, first, gallery, figures=figures, progress=progress,
@@ -190,7 +178,7 @@ def run_study(
 
 
 def _models(scenes: Scenes, options: SolveOptions) -> dict[str, str]:
-    """Return the model of each column; raises a ValueError if it cannot compute a scene."""
+    """Return the model of each column; raise a ValueError if it cannot compute a scene."""
     model = FEM.name if options.h and options.model == "auto" else options.model
     if model != "auto" and not named(model).needs_body:
         raise ValueError(f"{model} moves no body. Choose a model of a body, or leave --model out")
@@ -217,9 +205,9 @@ def _completeness(model: str) -> int:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Found:
+class BesideRuns:
     """What a study finds beside its runs: reduced bodies by column, surfaces, runs of flat slabs
-    beside bodies by column, and reasons of failed parts.
+    for comparison by column, and reasons of failed parts.
     """
 
     prepared: dict[str, ReducedBody] = field(default_factory=dict)
@@ -243,12 +231,12 @@ class Found:
 
 def _runs(
     scenes: Scenes, models: Mapping[str, str], options: SolveOptions, progress: Progress,
-    workers: Executor, found: Found,
+    workers: Executor, found: BesideRuns,
 ) -> Iterator[Run]:  # fmt: skip
     """Yield every run that does not fail, those of fast models first.
 
-    Bodies are reduced here, once for all Tactons. Workers compute the coarser bodies, for the
-    errors, all other responses, surfaces and checks.
+    Bodies are reduced here, once for all Tactons. Workers compute coarser bodies for the errors,
+    all other responses, surfaces and checks.
     """
     prepared, failures = found.prepared, found.failures
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
@@ -263,18 +251,18 @@ def _runs(
     coarse = {column: s for _, column, s in every if several and column in reduced}
     coarser = {c: workers.submit(coarser_body, s, options, sizes.get(c)) for c, s in coarse.items()}
     pictured = first_name(scenes)
-    part = played(scenes[pictured])
+    part = surfaces.played(scenes[pictured])
     meshed = {
         column: {name: group[column] for name, group in scenes.items() if column in group}
         for _, column, s in every
         if s.body.of_kind.discretise and s.reading.is_plain and not has_quick_map(s)
     }
     moved = [
-        workers.submit(element_surfaces, column, own, replace(options, model="auto"), part)
+        workers.submit(surfaces.element_surfaces, column, own, options, part)
         for column, own in meshed.items()
     ]
     flat = {
-        column: workers.submit(flat_run, pictured, scene, options)
+        column: workers.submit(surfaces.flat_run, pictured, scene, options)
         for column, scene in scenes[pictured].items() if column in reduced and scene.body.is_solid
     }  # fmt: skip
     others = {
@@ -286,32 +274,33 @@ def _runs(
         if column not in reduced
     }  # fmt: skip
     for k, (name, column, scene) in enumerate(every):
-        response = None
-        if column in reduced and column not in prepared and column not in failures:
-            reporting = replace(size_of[column], progress=partial(_report, progress, column))
+        reporting = replace(
+            size_of.get(column, options), progress=partial(_report, progress, column)
+        )
+        if several and column in reduced and column not in {*prepared, *failures}:
             with or_failed(failures, column):
-                if several:
-                    prepared[column] = reduce_scene(scene, reporting)
-                else:
-                    planned = plan(scene, replace(reporting, model=models[column]))
-                    response = solve_as_planned(scene, planned)
-                    if planned.prepared:
-                        prepared[column] = planned.prepared
-        if column in reduced and column not in prepared:
+                prepared[column] = reduce_scene(scene, reporting)
+        if column in failures:
             continue  # all Tactons on this body failed
         with or_failed(failures, f"{name} on {column}"):
-            if column in reduced and several:
+            if column not in reduced:
+                progress(f"response of {name} by {column} ({k + 1} of {len(every)})", 0.0)
+                cost = named(models[column]).cost
+                seconds = cost(scene, options, Effort()).seconds if cost else None
+                with expecting(progress, seconds):
+                    response, shown = others[name, column].result()
+                found.collect(*shown)
+            elif several:
                 progress(f"response of {name} by {column}", k / len(every))
                 response, body = answer(prepared[column], scene), prepared[column]
                 compared = coarser[column].result()
                 response = assess(scene, response, body, size_of[column], compared=compared)
-            elif column not in reduced:
-                progress(f"response of {name} by {column} ({k + 1} of {len(every)})", 0.0)
-                with expecting(progress, _seconds(models[column], scene, options)):
-                    response, shown = others[name, column].result()
-                found.collect(*shown)
-        body_name = column if scene.body.of_kind.discretise else "none"
-        if response:
+            else:
+                planned = plan(scene, replace(reporting, model=models[column]))
+                response = solve_as_planned(scene, planned)
+                if planned.prepared:
+                    prepared[column] = planned.prepared
+            body_name = column if scene.body.of_kind.discretise else "none"
             yield Run(tacton=name, body=body_name, scene=scene, response=response)
     for column, future in zip(meshed, moved, strict=True):
         progress(f"maps of {column}", 1.0)
@@ -321,12 +310,6 @@ def _runs(
         with or_failed(failures, f"flat slab beside {column}"):
             if run := slab.result():
                 found.checks[column] = run
-
-
-def _seconds(model: str, scene: Scene, options: SolveOptions) -> float | None:
-    """Return the predicted seconds of a response without a reduced body, if they are known."""
-    cost = named(model).cost
-    return cost(scene, options, Effort()).seconds if cost else None
 
 
 def _report(progress: Progress, column: str, phase: str, fraction: float) -> None:
@@ -341,4 +324,4 @@ def _response(
         return compute(scene, options.model), ({}, {})
     response = solve_as_planned(scene, plan(scene, options))
     run = Run(tacton=name, body=column, scene=scene, response=response)
-    return response, quick_surface(run, part)
+    return response, surfaces.quick_surface(run, part)

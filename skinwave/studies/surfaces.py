@@ -20,14 +20,9 @@ from skinwave.results.surface import element_map, grid, map_motions
 from skinwave.results.views import View, body_view, flat_view, kernel_view
 from skinwave.scene import paper15
 from skinwave.scene.scene import Scene, body_name, with_body
+from skinwave.studies import first_screen
 from skinwave.studies.assumptions import infinite
-from skinwave.studies.first_screen import (
-    Maps,
-    beside_kernel,
-    first_name,
-    has_quick_map,
-    quick_maps,
-)
+from skinwave.studies.first_screen import Maps, first_name, has_quick_map
 from skinwave.system.effort import silent
 from skinwave.system.failures import or_failed
 
@@ -54,13 +49,11 @@ def played(scenes: Mapping[str, Scene]) -> Part:
 
 
 def quick_surface(run: Run, part: Part | None) -> Found:
-    """Return the map of a body whose surface needs no mesh, with a view if it has a `part`, and
-    the reasons of failed parts.
-    """
+    """Return the map of a body whose surface needs no mesh, a view of the `part`, and failures."""
     failures: dict[str, str] = {}
     surface, body = Surface(), run.scene.body
     with or_failed(failures, f"map of {run.column}"):
-        surface = Surface(maps=quick_maps(run))
+        surface = Surface(maps=first_screen.quick_maps(run))
         if part and surface.maps:
             reach = np.array([body.width, body.height]) / 2
             surface = replace(surface, view=flat_view(run, reach, part))
@@ -70,9 +63,7 @@ def quick_surface(run: Run, part: Part | None) -> Found:
 def element_surfaces(
     column: str, scenes: Mapping[str, Scene], options: SolveOptions, part: Part
 ) -> Found:
-    """Return the maps of one meshed body under all Tactons, with a view of the first, and the
-    reasons of failed parts.
-    """
+    """Return the maps of one meshed body under all Tactons, a view of the first, and failures."""
     names, failures = {scene: name for name, scene in scenes.items()}, dict[str, str]()
     surfaces: Surfaces = {}
     with or_failed(failures, f"map of {column}"):
@@ -80,19 +71,20 @@ def element_surfaces(
             view, name = None, names[scene]
             if name == first_name(scenes):
                 view = replace(body_view(scene, column, motion, part), moved=None)
-            maps = beside_kernel(scene, element_map(scene, motion, *grid(scene)))
+            own = element_map(scene, motion, *grid(scene))
+            maps = first_screen.beside_kernel(scene, own)
             surfaces[name, column] = Surface(maps=maps, view=view)
     return surfaces, failures
 
 
 def begin_surface(scene: Scene, options: SolveOptions, workers: Executor) -> "Future[Found] | None":
-    """Begin the surface of a body of elements in a process, beside its response, or return None if
-    it needs no mesh or cannot be drawn.
+    """Begin the surface of a body of elements in a process, beside its response.
+
+    Returns None if the surface needs no mesh or cannot be drawn.
     """
     has_motion = options.model == "auto" or named(options.model).needs_body
-    if not (scene.body.of_kind.discretise and has_motion and scene.load.is_plain):
-        return None
-    if has_quick_map(scene):
+    is_drawn = scene.body.of_kind.discretise and has_motion and scene.load.is_plain
+    if not is_drawn or has_quick_map(scene):
         return None
     part = played({SAME_LOAD.name: paper15.beside_kernels(scene)[SAME_LOAD.name]})
     silently = replace(options, progress=silent)
@@ -101,9 +93,7 @@ def begin_surface(scene: Scene, options: SolveOptions, workers: Executor) -> "Fu
 
 
 def views_of(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:
-    """Return the views of the kernel and of bodies under one Tacton, if there are any; `scenes`
-    are those of the Tacton by column.
-    """
+    """Return the views of the kernel and of bodies under one Tacton, with its scenes by column."""
     views = {view.column: view for each in surfaces.values() if (view := each.view)}
     own = [views[column] for column in scenes if column in views]
     if not own:
@@ -113,8 +103,8 @@ def views_of(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:
 
 
 def flat_run(name: str, scene: Scene, options: SolveOptions) -> Run | None:
-    """Return the run of an infinite slab with the strata that a body has under the focus, or None
-    if the wavenumber integral does not take it.
+    """Return the run of an infinite slab with the strata of a body under the focus, or None if the
+    wavenumber integral cannot compute it.
     """
     flat = with_body(scene, infinite(scene, scene.body))
     if not takes(FLAT_BODY, flat):

@@ -18,17 +18,17 @@ from skinwave.system.document import Details, Markup, Part, Section
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
-MOST_LINES = 12  # in a table
 
-
-def lines_table(runs: Sequence[Run]) -> list[Part]:
-    """Return a table of the lines of each model at the probe that moves most, strongest first."""
+def lines_table(runs: Sequence[Run], most: int = 12) -> list[Part]:
+    """Return a table of the lines of each model at the probe that moves most, strongest first, and
+    of as many other peaks.
+    """
     probe = strongest_probe(runs)
     common = [name for name in runs[0].line_hz if all(name in run.line_hz for run in runs)]
     if not common and not any(run.unnamed for run in runs):
         return ["The load has no resolved line: the Tacton is too short or the pressure constant."]
     share = {name: max(_share(run, name, probe) for run in runs) for name in common}
-    names = sorted(share, key=lambda name: -share[name])[:MOST_LINES]
+    names = sorted(share, key=lambda name: -share[name])[:most]
     sensation = [sensation_levels(run, probe) for run in runs]
     rows = [
         [name, f"{runs[0].line_hz[name]:.1f}"]
@@ -42,7 +42,7 @@ def lines_table(runs: Sequence[Run]) -> list[Part]:
         columns += ["dB re threshold"] if run.is_skin else []
     x, y = 1e3 * runs[0].response.probes[probe]
     title = f"{runs[0].tacton}: lines at ({x:g}, {y:g}) mm"
-    return [Section(title, [Table(columns, [*rows, *_unnamed_rows(runs, probe)])], level=3)]
+    return [Section(title, [Table(columns, [*rows, *_unnamed_rows(runs, probe, most)])], level=3)]
 
 
 def _share(run: Run, name: str, probe: int) -> float:
@@ -61,16 +61,15 @@ def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> 
         return [size]
     if (level := levels.get(name)) is None:
         return [size, ""]
-    if level < FAINTEST:
-        return [size, decibel(level)]
-    return [size, f"{round(level):+d}" if round(level) else "0"]
+    exact = f"{round(level):+d}" if round(level) else "0"
+    return [size, decibel(level) if level < FAINTEST else exact]
 
 
-def _unnamed_rows(runs: Sequence[Run], probe: int) -> Iterator[list[object]]:
+def _unnamed_rows(runs: Sequence[Run], probe: int, most: int) -> Iterator[list[object]]:
     """Yield a row for each peak that is not a line of the load."""
     by_run = [
         {(peak.kind, round(peak.frequency, 1)): peak.amplitudes[probe]
-         for peak in reversed(run.unnamed[:MOST_LINES])}
+         for peak in reversed(run.unnamed[:most])}
         for run in runs
     ]  # fmt: skip
     for kind, frequency in sorted({key for peaks in by_run for key in peaks}):
@@ -134,11 +133,10 @@ def _disagreements(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
 
 
 def agreement_parts(runs: Mapping[str, Sequence[Run]], checks: Mapping[str, Run]) -> list[Part]:
-    """Return a table that compares pairs of responses that differ in one respect, and what the
-    comparison with flat slabs shows.
+    """Return a table that compares pairs of responses, and a paragraph on the flat slabs.
 
-    Drive law and focus change between the two kernels, propagation between kernel and body, shape
-    and support between a body and the flat slab in `checks`, by column.
+    One thing changes in a pair: drive law and focus between the two kernels, propagation between
+    kernel and body, shape and support between a body and the flat slab in `checks`, by column.
     """
     rows = [
         [name, changed, f"{label(a.column)} → {label(b.column)}", *_agreement(a, b)]
@@ -205,9 +203,7 @@ def _range(values: Floats) -> str:
 def effort_table(
     efforts: Mapping[str, Effort], tactons: int, total: float | None = None
 ) -> list[Part]:
-    """Return the parts of the expected error of each body, a table of time, size and memory, and
-    the totals.
-    """
+    """Return tables of the expected errors and of time, size and memory, and the totals."""
     errors = [
         [label(name), effort.errors.words, effort.errors.cure]
         for name, effort in efforts.items() if effort.errors.parts
@@ -227,12 +223,9 @@ def effort_table(
     text = f"{plural(tactons, 'Tacton')}: {significant(spent, 2)} s"
     text += f", at most {peak:.2f} GiB in one process" * bool(peak)
     error_rule = "The squares of the parts add, because their causes are independent."
-    columns = (
-        "body",
-        "expected error of the waveform at the worst probe",
-        "cure of the largest part",
-    )
-    parts: list[Part] = [Table(columns, errors), error_rule] if errors else []
+    expected = "expected error of the waveform at the worst probe"
+    table = Table(["body", expected, "cure of the largest part"], errors)
+    parts: list[Part] = [table, error_rule] if errors else []
     effort_columns = (
         "body", "degrees of freedom", "reduced to", Column("estimated reduction error", digits=2),
         Column("relative energy imbalance", digits=1), "radiated share of loss", "solver",

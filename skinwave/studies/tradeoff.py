@@ -6,7 +6,7 @@ Errors are those of the worst probe's waveform.
 
 import os
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -34,9 +34,6 @@ from skinwave.system.effort import Progress, peak_memory
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.processes import pool
 from skinwave.system.table import Column, Table
-
-FINEST = (0.6, 0.5)  # element sizes of the two finest runs, whose difference tests convergence
-BARS = (0.01, 0.05, 0.20)  # errors for which the cheapest candidate is named
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,21 +70,24 @@ class Result:
     dofs: int
 
     def beats(self, other: "Result") -> bool:
-        """Whether it is as accurate and fast, cold and warm, and better in one of these."""
+        """Whether error, cold and warm time are no larger than the other's, and one is smaller."""
         own, others = ((m.error, m.cold, m.warm) for m in (self, other))
         return own != others and all(a <= b for a, b in zip(own, others, strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
-    """Results of all candidates by cold time, self-convergence of the reference, and reasons of
-    candidates that failed.
+class Tradeoff:
+    """Results of all candidates by cold time, and reasons of candidates that failed.
+
+    `self_convergence` is the difference of the reference from the next coarser run; `bars` are the
+    errors for which the page names the cheapest candidate.
     """
 
     results: tuple[Result, ...]
     reference: Candidate
     self_convergence: float
     failures: Mapping[str, str] = field(default_factory=dict)
+    bars: tuple[float, ...] = (0.01, 0.05, 0.20)
 
     @property
     def is_converged(self) -> bool:
@@ -123,20 +123,23 @@ def candidates(scene: Scene) -> list[Candidate]:
     return [*every, Candidate(model="fem-harmonic", h=sizes[1])]
 
 
-def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None = None) -> Study:
+def tradeoff(
+    scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None = None, *,
+    finest: Sequence[float] = (0.6, 0.5),
+) -> Tradeoff:  # fmt: skip
     """Measure candidates on a scene, each in a process of its own, which measures its memory.
 
-    Raises a ValueError if the scene has no body, or a load other than a pressure, or if the
-    reference or every candidate fails.
+    `finest` are the element sizes of the two finest runs over the default one; the difference of
+    these runs tests convergence. Raises a ValueError if the scene has no body, or a load other than
+    a pressure, or if the reference or every candidate fails.
     """
     check_load(scene, "tradeoff")
     if not scene.body.of_kind.discretise:
         raise ValueError("a scene without a body has one model only. Give it a sheet or a slab")
     tested = list(chosen or candidates(scene))
-    fine = [Candidate(model="fem", h=round(default_size(scene.body) * f, 6)) for f in FINEST]
-    finest_tolerances = (0.01, 0.003)  # for stretching plates
-    if stretches(scene, min(BARS)):
-        fine = [Candidate(model=STRETCHED.name, tolerance=t) for t in finest_tolerances]
+    fine = [Candidate(model="fem", h=round(default_size(scene.body) * f, 6)) for f in finest]
+    if stretches(scene, min(Tradeoff.bars)):
+        fine = [Candidate(model=STRETCHED.name, tolerance=t) for t in (0.01, 0.003)]
     runs = {}
     failures: dict[str, str] = {}
     with pool(1, threads=None, renewed=True) as other:
@@ -155,7 +158,7 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
             candidate=each, error=error, cold=cold, warm=warm, memory=memory,
             dofs=response.effort.dofs,
         ))  # fmt: skip
-    return Study(
+    return Tradeoff(
         results=tuple(sorted(results, key=lambda result: result.cold)), reference=fine[-1],
         self_convergence=float(compare(reference, coarser).relative_l2.max()), failures=failures,
     )  # fmt: skip
@@ -171,15 +174,14 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
         response, ready = answer(prepared, scene), time.perf_counter()
         answer(prepared, scene)
         return response, ready - started, time.perf_counter() - ready, peak_memory()
-    planned = 0.05  # tolerance of a candidate without one
-    tolerance = candidate.tolerance or planned
+    tolerance = candidate.tolerance or SolveOptions.tolerance
     response = compute(scene, candidate.model, tolerance=tolerance, h=candidate.h, dt=candidate.dt)
     cold = time.perf_counter() - started
     return response, cold, cold, peak_memory()
 
 
-def write(folder: Path, scene: Scene, outcome: Study) -> None:
-    """Write index.html, tradeoff.png and tradeoff.csv of a study."""
+def write(folder: Path, scene: Scene, outcome: Tradeoff) -> None:
+    """Write index.html, tradeoff.png and tradeoff.csv."""
     front = outcome.front()
     table = Table(
         ["candidate", Column("front", "on the front"), Column("error_percent", "error", "%"),
@@ -196,13 +198,13 @@ def write(folder: Path, scene: Scene, outcome: Study) -> None:
     )
     picture = Picture(png(_figure(outcome), dpi=130), caption, "tradeoff")
     title = f"Speed against accuracy: {scene.name}"
-    parts = sentences(outcome)
-    verdict = [" ".join(parts[-len(BARS) :]), " ".join(parts[: -len(BARS)])]
+    parts, bars = sentences(outcome), len(outcome.bars)
+    verdict = [" ".join(parts[-bars:]), " ".join(parts[:-bars])]
     Report(title, verdict, [picture, table], failures=outcome.failures).write(folder)
 
 
-def sentences(outcome: Study) -> list[str]:
-    """Return sentences on the reference, and the cheapest candidate for each of `BARS`."""
+def sentences(outcome: Tradeoff) -> list[str]:
+    """Return sentences on the reference, and on the cheapest candidate for each bar."""
     parts = [
         f"The reference, {outcome.reference.name}, differs from the next coarser run by "
         f"{percent(outcome.self_convergence)}."
@@ -215,7 +217,7 @@ def sentences(outcome: Study) -> list[str]:
             "flat-body is the analytic solution of a laterally infinite body. It differs from the "
             "meshed body by the reflections from its sides."
         )
-    for bar in BARS:
+    for bar in outcome.bars:
         best = "no candidate"
         if m := outcome.cheapest(bar):
             best = f"{m.candidate.name}, {m.cold:.2g} s (error {percent(m.error)})"
@@ -223,7 +225,7 @@ def sentences(outcome: Study) -> list[str]:
     return parts
 
 
-def _figure(outcome: Study) -> Figure:
+def _figure(outcome: Tradeoff) -> Figure:
     """Draw error over cold and warm seconds, with one colour for each model."""
     figure = Figure(figsize=(10, 5.2), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
@@ -239,9 +241,9 @@ def _figure(outcome: Study) -> Figure:
                     s=[20 + m.memory / 2**22 for m in own], color=colour, alpha=0.75,
                     edgecolors="black", linewidths=edges,
                 )  # fmt: skip
-    entries["difference of the two finest runs"] = {"color": "0.5", "ls": ":", "lw": 1}
+    dotted = entries["difference of the two finest runs"] = {"color": "0.5", "ls": ":", "lw": 1}
     for ax in panels:
-        ax.axhline(100 * outcome.self_convergence, **entries["difference of the two finest runs"])
+        ax.axhline(100 * outcome.self_convergence, **dotted)
         ax.set(xscale="log", yscale="log")
         ax.grid(alpha=0.3, which="both")
     panels[0].set(xlabel="first response (cold), s", ylabel="error of the worst probe, %")

@@ -20,7 +20,7 @@ from skinwave.scene.file import loads
 from skinwave.studies import relax, tradeoff
 from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Hierarchy, HierarchyStep
-from skinwave.studies.tradeoff import Candidate, Study
+from skinwave.studies.tradeoff import Candidate, Tradeoff
 from skinwave.studies.tradeoff import Result as TradeoffResult
 from skinwave.system import document
 from skinwave.system.document import Details, Markup, Picture, Report, Section
@@ -74,7 +74,9 @@ def traded(folder):
         candidate=Candidate(model=HOSTILE), error=0.1, cold=1.0, warm=0.1, memory=1, dofs=1,
     )  # fmt: skip
     known = replace(result, candidate=Candidate(model="fem"))
-    found = Study(results=(result, known), reference=Candidate(model="fem"), self_convergence=0.001)
+    found = Tradeoff(
+        results=(result, known), reference=Candidate(model="fem"), self_convergence=0.001
+    )
     tradeoff.write(folder, loads(table()), found)
 
 

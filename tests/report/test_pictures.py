@@ -20,6 +20,7 @@ import read_results
 from in_browser import needs_browser, settled
 from legible import illegible, sizes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from PIL import Image
 
 from simple_model import (
@@ -435,13 +436,18 @@ def test_a_report_is_drawn_again_without_a_model_or_gl(folder, tmp_path, monkeyp
 
 
 def test_a_film_that_fails_is_left_out_by_name(monkeypatch):
-    view = SimpleNamespace(column="palm", quantity=DISPLACEMENT, peak=1.0, tets=())
+    view = SimpleNamespace(column="palm", quantity=DISPLACEMENT, peak=1.0, tets=(), peak_frame=0,
+                           scene=loads(""))  # fmt: skip
     monkeypatch.setattr(render, "scale_text", lambda view: "to scale")
     monkeypatch.setattr(render, "picture", lambda *given: np.zeros((8, 8, 3), np.uint8))
+    monkeypatch.setattr(report.maps, "snapshots_figure", lambda *given: Figure())
+    monkeypatch.setattr(report, "turntable", lambda *given: "")
+    monkeypatch.setattr(report, "renderer", lambda: SimpleNamespace(is_available=True))
     monkeypatch.setattr(report, "_film", Mock(side_effect=ArithmeticError("no frames")))
-    gallery, failures = pages.Gallery(), {}
-    parts = report._spatial_parts(view, 0, [view], gallery, lambda *phase: None, failures)
-    assert (list(parts), failures) == (["side by side"], {"film": "no frames"})
+    album, failures = SimpleNamespace(views={"palm": view}, scene=view.scene), {}
+    (section,) = report.picture_parts(album, pages.Gallery(), lambda *phase: None, failures)
+    assert list(section.parts[0].options) == ["side by side", "snapshots"]
+    assert failures == {"film": "no frames"}
 
 
 def test_a_crash_of_the_renderer_is_detected(monkeypatch):

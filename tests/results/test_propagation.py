@@ -367,7 +367,7 @@ def test_the_verdict_over_tactons_counts_lines_and_states_medians():
     first = first_screen(groups, quick_maps)
     values = 1e3 * np.array([each["skin-slab"].half for each in first.effects.values()])
     rows = {row[0]: row[1:] for row in overview.table(first.effects).rows}
-    assert rows[overview.HALF][1].startswith(significant(float(np.median(values)), 2))
+    assert rows[overview.NUMBERS[0].name][1].startswith(significant(float(np.median(values)), 2))
     assert rows["motion outside the kernel's -20 dB region"][0] == "0 %"
     (motion,) = overview.sentences(first.effects, groups)  # all have the kernel's strongest line
     assert "same 3 loads" in motion

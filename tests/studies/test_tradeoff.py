@@ -13,13 +13,12 @@ from skinwave.planning.simulate import compute
 from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES, Body
 from skinwave.studies import paper_vs_skin
-from skinwave.studies.tradeoff import Candidate, candidates, study, write
+from skinwave.studies.tradeoff import Candidate, candidates, tradeoff, write
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_one_process")
-def test_tradeoff_ranks_candidates_by_cost_and_error(tmp_path, monkeypatch):
-    monkeypatch.setattr("skinwave.studies.tradeoff.FINEST", (1.5, 1.25))
+def test_tradeoff_ranks_candidates_by_cost_and_error(tmp_path):
     scene = loads(SHORT)
     scene = replace(scene, body=replace(scene.body, width=0.03, height=0.03, sides="free"))
     chosen = [
@@ -29,7 +28,8 @@ def test_tradeoff_ranks_candidates_by_cost_and_error(tmp_path, monkeypatch):
         Candidate(model="fem-transient", h=0.012, dt=2e-3),
     ]
     phases = []
-    found = study(scene, lambda phase, fraction: phases.append(phase), chosen)
+    finest = (1.5, 1.25)
+    found = tradeoff(scene, lambda phase, _: phases.append(phase), chosen, finest=finest)
     error = {m.candidate.name: m.error for m in found.results}
     assert error["fem, h = 6.00 mm"] < error["fem, h = 12.00 mm"] < error["point-kernel"]
     assert error["fem-transient, h = 12.00 mm, dt = 2 ms"] > error["fem, h = 12.00 mm"]
@@ -54,12 +54,12 @@ def test_a_candidate_that_fails_is_named(tmp_path, monkeypatch):
 
     monkeypatch.setattr("skinwave.studies.tradeoff._run", run)
     chosen = [Candidate(model="point-kernel"), Candidate(model="fem-transient", dt=1.0)]
-    found = study(scene, lambda *phase: None, chosen)
+    found = tradeoff(scene, lambda *phase: None, chosen)
     assert found.failures == {chosen[1].name: "not finite"}
     write(tmp_path, scene, found)
     assert "1 part of this result failed" in (tmp_path / "index.html").read_text()
     with pytest.raises(ValueError, match="not finite"):
-        study(scene, lambda *phase: None, chosen[1:])
+        tradeoff(scene, lambda *phase: None, chosen[1:])
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_every_candidate_takes_its_scene(body):
 
 def test_tradeoff_needs_a_body():
     with pytest.raises(ValueError, match="sheet or a slab"):
-        study(loads("[body]\nkind = 'none'"), lambda phase, fraction: None)
+        tradeoff(loads("[body]\nkind = 'none'"), lambda phase, fraction: None)
 
 
 def test_load_ratios_are_those_of_the_fourier_series():
@@ -94,15 +94,13 @@ def test_load_ratios_are_those_of_the_fourier_series():
 
 
 @pytest.mark.slow
-def test_ratios_over_amplitude_separate_lines_of_sheet_and_load(tmp_path, monkeypatch):
-    monkeypatch.setattr(paper_vs_skin, "DURATION", 0.2)  # s; steady after half of it
-    monkeypatch.setattr(paper_vs_skin, "AMPLITUDES", (0.25, 1.0))
+def test_ratios_over_amplitude_separate_lines_of_sheet_and_load(tmp_path):
     bodies = {
         "paper-sheet-loose": replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06),
         "skin-slab": Body(width=0.042, height=0.042, depth=0.01, sides="clamped"),
     }
     still = [("am140", Tacton(am_frequency=140, trajectory=Trajectory()))]
-    given = {"patterns": still, "bodies": bodies}
+    given = {"patterns": still, "bodies": bodies, "duration": 0.2, "amplitudes": (0.25, 1.0)}
     found = paper_vs_skin.paper_vs_skin(lambda phase, done: None, h=0.0075, **given)
     for body in ("loose sheet", "skin slab"):
         assert max(found.ratios[f"{body}: linear load"]) < 1e-5
