@@ -135,12 +135,6 @@ def accuracy(response: "Response") -> dict[str, Any]:
     return {**effort.errors.summary(), "warnings": list(effort.warnings)}
 
 
-def check_seed(seed: int) -> None:
-    """Raise a ValueError if the seed of random samples is negative."""
-    if seed < 0:
-        raise ValueError(f"--seed is {seed}; give 0 or a positive whole number")
-
-
 def note_scenes(options: argparse.Namespace) -> None:
     """Warn of implausible numbers in the scenes of a command, unless the warnings of its responses
     do, and print notes on the map of a focus, and on spreads that it ignores.

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from skinwave.commands.common import (
     add_model_name,
     add_output,
-    check_seed,
     closing,
     result_folder,
     summarise,
@@ -75,6 +74,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.measure.fit import fit
     from skinwave.measure.fit_page import summary, write
     from skinwave.scene.file import read
+    from skinwave.sweeps.sampling import check_seed
 
     check_seed(options.seed)
     scene = read(options.scene)

@@ -14,7 +14,6 @@ from skinwave.commands.common import (
     add_model,
     add_reporting,
     add_width,
-    check_seed,
     metre,
     progress_of,
     summarise,
@@ -127,6 +126,7 @@ def _sweep(
     from skinwave.scene.distributions import Spread
     from skinwave.scene.variation import SAMPLED, cases, combinations, parse
     from skinwave.sweeps import best, dataset, uncertainty_page
+    from skinwave.sweeps.sampling import check_seed
     from skinwave.sweeps.sweep import Sweep
     from skinwave.sweeps.table_figures import best_figure
 

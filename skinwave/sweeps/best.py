@@ -25,11 +25,8 @@ from skinwave.sweeps.sweep import Combinations, Sweep
 from skinwave.sweeps.table_figures import value
 from skinwave.typing import Floats
 
-SAMPLES, FEWEST_SAMPLES = 199, 39  # by default; for a 95 % interval
-ENDS = (2.5, 97.5)  # percentiles at the ends of the interval
-REFINEMENTS = 2  # runs at vertices, for each key
+FEWEST_SAMPLES = 39  # for a 95 % interval
 ACCURACY = 0.1  # of a best value, in steps of the grid
-FOLDER = "samples"  # of the sweep of the samples, in that of the sweep
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +118,7 @@ def find_best(
 
     Raises a ValueError if no run has a number in the column, or too few samples have one.
     """
-    n, levels = samples or SAMPLES, {grid.key: grid.values for grid in grids}
+    n, levels = samples or 199, {grid.key: grid.values for grid in grids}
     (values,), (result,) = optima(lambda runs: _column(sweep, column, runs), levels, [{}])
     if not np.isfinite(result):
         raise ValueError(f"column '{column}' has no finite number in this sweep; choose another")
@@ -145,7 +142,7 @@ def find_best(
     # Samples use the steady state in place of the wavenumber integral from rest.
     steady = {*models} == {FLAT_BODY.name} and all(takes(HARMONIC, scene) for scene in scenes)
     own = replace(
-        sweep, folder=sweep.folder / FOLDER, assessed=False, waveforms=False,
+        sweep, folder=sweep.folder / "samples", assessed=False, waveforms=False,
         options=replace(sweep.options, model=HARMONIC.name) if steady else sweep.options,
         progress=lambda step, part: sweep.progress("samples" if step == "run" else step, part),
     )  # fmt: skip
@@ -157,7 +154,7 @@ def find_best(
             f"only {len(bests)} of {n} samples have a number in column '{column}'; narrow their "
             "distributions or choose another column"
         )
-    ends = np.percentile(bests, ENDS, axis=0, method="weibull").T
+    ends = np.percentile(bests, (2.5, 97.5), axis=0, method="weibull").T
     intervals = [  # with the accuracy of a best value
         np.clip(each + [-margin, margin], *best.limits).tolist()
         for best, each in zip(found, ends, strict=True)
@@ -191,10 +188,12 @@ def optima(
     evaluate: Callable[[Combinations], Floats],
     grids: Mapping[str, Sequence[float]],
     settings: Combinations,
+    refinements: int = 2,
 ) -> tuple[Floats, Floats]:
-    """Return the best values (n, d) of d keys for settings (n,) of other keys, refined from grids
-    of all their combinations, and the column (n,) there, -inf if a setting has none.
+    """Return the best values (n, d) of d keys for settings (n,) of other keys, and the column (n,)
+    there, -inf if a setting has none.
 
+    They are refined from grids of all combinations, at `refinements` vertices for each key.
     `evaluate` returns the column (m,) of runs (m,), or nan.
     """
 
@@ -213,7 +212,7 @@ def optima(
     mesh = np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
     x = np.tile(mesh, (len(settings), 1, 1))
     y = column_at(x)
-    for _ in range(REFINEMENTS * len(levels)):
+    for _ in range(refinements * len(levels)):
         vertices = np.array([[_vertex(*each, levels)] for each in zip(x, y, strict=True)])
         x, y = np.hstack([x, vertices]), np.hstack([y, column_at(vertices)])
     best = np.arange(len(x)), y.argmax(axis=1)

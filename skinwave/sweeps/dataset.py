@@ -25,10 +25,6 @@ from skinwave.system.plain_text import csv_table
 
 # In the folder of a sweep: those of the table, of pieces, and of waveforms with these two; the CSV.
 ROWS, PIECES, WAVEFORMS, CSV = "rows", "pieces", "waveforms", "rows.csv"
-LOCK = ".lock"  # file in the folder of rows
-FROM_PYTHON = {"typed": "", "name": "sweep", "options": {}}  # command of a sweep in Python
-LARGEST_FILE = 500_000_000  # bytes
-MOST_ROWS = 1_000_000  # of one file
 KEY, INDEX = "key", "index"  # columns: a row's name, and its place in the design
 OUTCOME = (INDEX, KEY, "status", "error")
 WAVEFORM = "waveform_"  # start of a column; files have these and those above even if all are alike
@@ -46,7 +42,7 @@ def open_folder(out: Path, command: Mapping[str, Any] | None = None) -> Path:
         check_folder(out)
         return out
     (out / ROWS).mkdir(parents=True)
-    record.write(out, command or FROM_PYTHON)
+    record.write(out, command or {"typed": "", "name": "sweep", "options": {}})
     return out
 
 
@@ -66,7 +62,7 @@ def lock_rows(out: Path) -> Iterator[None]:
 
     The operating system releases the lock however the process ends.
     """
-    with open(out / ROWS / LOCK, "ab") as file:
+    with open(out / ROWS / ".lock", "ab") as file:
         try:
             _lock(file.fileno())
         except OSError:
@@ -87,6 +83,15 @@ def _lock(descriptor: int) -> None:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
+def _same(columns: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
+    """Return the value of each column whose values are alike and which files may leave out."""
+    return {
+        name: cells[0] for name, cells in columns.items()
+        if name not in OUTCOME and not name.startswith(WAVEFORM)
+        and all(cell == cells[0] for cell in cells)
+    }  # fmt: skip
+
+
 def append(out: Path, rows: Sequence[Row]) -> None:
     """Write rows as a piece; cells may be missing."""
     import pyarrow as pa
@@ -94,11 +99,7 @@ def append(out: Path, rows: Sequence[Row]) -> None:
 
     names = dict.fromkeys(name for row in rows for name in row)
     cells = {name: [row.get(name) for row in rows] for name in names}
-    same = {
-        name: column[0] for name, column in cells.items()
-        if name not in OUTCOME and not name.startswith(WAVEFORM)
-        and all(cell == column[0] for cell in column)
-    }  # fmt: skip
+    same = _same(cells)
     table = pa.table({name: column for name, column in cells.items() if name not in same})
     table = table.replace_schema_metadata({CONSTANTS: json.dumps(same, default=float)})
     (out / PIECES).mkdir(parents=True, exist_ok=True)
@@ -193,11 +194,7 @@ def _common_schema(paths: Sequence[Path], all_columns: bool) -> Any:
         schemas += [file.schema_arrow.remove_metadata(), pa.Table.from_pylist([same]).schema]
         values.append(dict.fromkeys(file.schema_arrow.names, np.nan) | same)
     schema = pa.unify_schemas(schemas, promote_options="permissive")
-    constants = {
-        name: values[0].get(name) for name in schema.names
-        if name not in OUTCOME and not name.startswith(WAVEFORM)
-        and all(each.get(name) == values[0].get(name) for each in values)
-    }  # fmt: skip
+    constants = _same({name: [each.get(name) for each in values] for name in schema.names})
     kept = [field for field in schema if all_columns or field.name not in constants]
     return pa.schema(kept, {CONSTANTS: json.dumps(constants).encode()})
 
@@ -288,7 +285,7 @@ def _files(out: Path) -> tuple[list[Path], list[Path]]:
 
 @contextmanager
 def _readable(out: Path) -> Iterator[None]:
-    """Raise a ValueError if files are not rows of a sweep."""
+    """Raise a ValueError in place of an error of a block that reads files of rows."""
     import pyarrow as pa
 
     try:
@@ -298,35 +295,32 @@ def _readable(out: Path) -> Iterator[None]:
         raise ValueError(f"{out} cannot be read ({cause}); name the folder of a sweep") from None
 
 
-def _open(path: Path) -> Any:
+def _open(path: Path, most_bytes: int = 500_000_000, most_rows: int = 1_000_000) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    file = pq.ParquetFile(pa.BufferReader(reading.read_bytes(path, LARGEST_FILE)))
-    if file.metadata.num_rows > MOST_ROWS:
+    file = pq.ParquetFile(pa.BufferReader(reading.read_bytes(path, most_bytes)))
+    if file.metadata.num_rows > most_rows:
         raise ValueError(
-            f"{path.name} has {file.metadata.num_rows:,} rows; a sweep writes at most {MOST_ROWS:,}"
+            f"{path.name} has {file.metadata.num_rows:,} rows; a sweep writes at most {most_rows:,}"
         )
-    schema = file.schema_arrow
-    if not (
-        pa.types.is_string(schema.field(KEY).type) and pa.types.is_integer(schema.field(INDEX).type)
-    ):
+    key, index = (file.schema_arrow.field(name).type for name in (KEY, INDEX))
+    if not (pa.types.is_string(key) and pa.types.is_integer(index)):
         raise ValueError(f"a row of {path.name} has no {KEY} or no {INDEX}")
     return file
 
 
 def csv_of(rows: Iterable[Row]) -> bytes:
     """Return rows as CSV; a list becomes one column for each probe."""
-    flat = [dict(each for name, value in row.items() for each in _cells(name, value))
-            for row in rows]  # fmt: skip
+    flat = []
+    for row in rows:
+        cells: dict[str, Any] = {}
+        for name, value in row.items():
+            is_list = isinstance(value, list)
+            cells |= {f"{name}[{k}]": x for k, x in enumerate(value)} if is_list else {name: value}
+        flat.append(cells)
     columns = list(dict.fromkeys(name for row in flat for name in row))
     return csv_table(columns, ([row.get(name) for name in columns] for row in flat))
-
-
-def _cells(name: str, value: Any) -> Iterable[tuple[str, Any]]:
-    if isinstance(value, list):
-        return [(f"{name}[{k}]", x) for k, x in enumerate(value)]
-    return [(name, value)]
 
 
 def write_beside(out: Path, files: Mapping[str, bytes]) -> None:
@@ -349,6 +343,6 @@ def check_own_files(out: Path, names: Iterable[str]) -> None:
         path = out / name
         if os.path.lexists(path) and not outputs.is_unchanged(path, known.get(name)):
             raise ValueError(
-                f"{path} was added or changed since skinwave wrote it and is not replaced; move it "
-                "elsewhere"
+                f"{path} was added or changed after skinwave wrote it, and is not replaced; move "
+                "it elsewhere"
             )

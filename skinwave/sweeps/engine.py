@@ -30,8 +30,6 @@ from skinwave.system.processes import pool
 LOCAL = ("processes", "threads")
 ATTEMPTS = 3  # at items whose worker is killed: in a piece, as a piece, and with no other running
 IN_FLIGHT = 2  # pieces for each worker
-CONNECTION_TIMEOUT = 10  # s
-POLLING = 5  # s, after which new workers of a scheduler get pieces
 
 
 def check(scheduler: str) -> None:
@@ -72,9 +70,9 @@ def run_all(
 ) -> None:
     """Compute items on `count` workers; call `done(results by index)` here after each piece.
 
-    A piece takes about `seconds`: its length follows from the last one, and a worker returns what
-    it has by then. If a worker is killed, others repeat its items, one at a time. Items that kill
-    every worker are left out.
+    A piece takes about `seconds`. Its length follows from the last piece, and a worker returns the
+    results that it has by then. If a worker is killed, others repeat its items, one at a time.
+    Items that kill every worker are left out.
     """
     waiting, killed, size = deque(range(len(items))), Counter[int](), 1
     limit = [seconds]
@@ -90,7 +88,7 @@ def run_all(
                     except BrokenProcessPool:
                         waiting.extendleft(reversed(piece))
                         broken = True
-                polling = None if scheduler in LOCAL else POLLING
+                polling = None if scheduler in LOCAL else 5  # s: new workers then get pieces
                 for future in wait(running, polling, FIRST_COMPLETED).done:
                     piece, error = running.pop(future), future.exception()
                     if type(error).__name__ in ("BrokenProcessPool", "KilledWorker"):
@@ -112,7 +110,7 @@ def _take(
     running: Mapping[Any, Sequence[int]],
     workers: int,
 ) -> list[int]:
-    """Take the next piece of at most `size` from the waiting items; none if it has to wait."""
+    """Take the next piece of at most `size` from the waiting items; empty if it has to wait."""
     if not waiting or len(running) >= IN_FLIGHT * workers:
         return []
     heads = [waiting[0], *(piece[0] for piece in running.values())]
@@ -130,12 +128,12 @@ def _compute(
     work: Callable[[Any], Any], items: Sequence[Any], limit: Sequence[float]
 ) -> tuple[list[Any], float]:
     """Return, on a worker, the results of the first items, at least one, and their seconds."""
-    results, started = [], time.perf_counter()
+    results, started, took = [], time.perf_counter(), 0.0
     for item in items:
         results.append(work(item))
-        if time.perf_counter() - started >= limit[0]:
+        if (took := time.perf_counter() - started) >= limit[0]:
             break
-    return results, time.perf_counter() - started
+    return results, took
 
 
 @contextmanager
@@ -192,11 +190,11 @@ def _threads(client: Any, known: set[str]) -> int:
 
 
 @contextmanager
-def _client(address: str) -> Iterator[Any]:
+def _client(address: str, timeout: float = 10.0) -> Iterator[Any]:
     from distributed import Client
 
     try:
-        client = Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
+        client = Client(address, timeout=timeout, set_as_default=False)
     except (OSError, ValueError) as error:
         cause = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(

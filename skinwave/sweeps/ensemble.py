@@ -44,24 +44,20 @@ from skinwave.sweeps.sampling import one_at_a_time, samples
 from skinwave.system.effort import Progress, one_thread, silent
 from skinwave.typing import Complex, Floats
 
-WEAKEST_LINE = 1e-2  # of the strongest line of the load: weaker ones are not evaluated
-MOST_LINES = 24
-NEGLIGIBLE_LINE = 1e-3  # of the load's strongest line: weaker ones are left out of solutions
-FEW = 32  # samples up to which starting processes costs more than it saves
-STEP = 0.004  # m, of a map
-ROUND_OFF = 1e-12  # of the largest line
-# Quantiles of each number between which bodies are reduced together: a palm needs 785 vectors for
-# those of a hundred samples, and more than one model can have for the farthest of 256.
-SHARED = (0.01, 0.99)
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Method:
     """How samples are solved.
 
-    `lines` are the names of the evaluated lines. Samples are solved with the `options`, or by the
-    wavenumber integral if `mapped`. If `same_load`, the loads of samples differ only in pressure.
-    `family` are bodies that are reduced together, for the steady state.
+    Parameters
+    ----------
+    lines : names of the evaluated lines
+    options : SolveOptions of samples that the wavenumber integral does not solve
+    mapped : whether it solves them, with a map of a `step` in m
+    same_load : whether the loads of samples differ only in pressure
+    family : bodies that are reduced together, for the steady state
+    negligible_ratio : lines that are weaker than this, relative to the strongest line of the load,
+        are left out of wavenumber integrals
     """
 
     lines: tuple[str, ...]
@@ -69,6 +65,8 @@ class Method:
     mapped: bool = False
     same_load: bool = False
     family: Covering | None = None
+    step: float = 0.004
+    negligible_ratio: float = 1e-3
 
     @property
     def words(self) -> str:
@@ -77,6 +75,10 @@ class Method:
             return "by the wavenumber integral, in the steady state"
         together = ", mostly with one reduced-order model, in the steady state"
         return f"by {self.options.model}{together if self.family else ''}"
+
+    def map_axes(self, scene: Scene) -> tuple[Floats, Floats]:
+        """Return the coordinates (nx,) and (ny,) in m of the map."""
+        return grid(scene, MAP.reach, self.step)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,7 +162,8 @@ def propagate(
 
 def method_of(scene: Scene, options: SolveOptions) -> Method:
     """Return the method for the samples of a scene, with a body for each."""
-    lines = tuple(named_lines(scene.pressure, WEAKEST_LINE, most=MOST_LINES))
+    weakest_ratio, most_lines = 1e-2, 24  # to the strongest line of the load
+    lines = tuple(named_lines(scene.pressure, weakest_ratio, most=most_lines))
     same = all(s.part == "material" or s.key == PRESSURE for s in spreads_of(scene))
     mapped = has_wavenumber_integral(scene) and scene.reading.is_plain
     return Method(lines=lines, options=options, mapped=mapped, same_load=same)
@@ -172,14 +175,18 @@ def shared_family(
     values: Floats,
     method: Method,
     progress: Progress = silent,
+    quantiles: tuple[float, float] = (0.01, 0.99),
 ) -> Covering | None:
     """Reduce the bodies of most samples (n, d) together, cached on disk. Return None if separate
     reductions cost less or a common one is not possible.
+
+    The bodies have each number between its `quantiles`. A palm needs 785 vectors for those of a
+    hundred samples, and more than one model can have for the farthest of 256.
     """
     free = {}
     for spread, column in zip(spreads, values.T, strict=True):
         if spread.key != PRESSURE:
-            low, high = spread.at(SHARED)
+            low, high = spread.at(quantiles)
             free[spread.key] = max(low, float(column.min())), min(high, float(column.max()))
     by_elements = method.options.model == FEM.name and method.same_load and not method.mapped
     if not (free and by_elements and scene.reading.is_plain and scene.pressure.peak_pressure):
@@ -202,7 +209,8 @@ def ensemble(
     """Solve a scene at samples (n, d); the number of processes does not affect the result."""
     keys = tuple(spread.key for spread in spreads)
     different, factors = values.copy(), np.ones(len(values))
-    if PRESSURE in keys and _is_proportional_to_pressure(scene, method):
+    is_proportional = method.mapped or is_linear(scene, method.options.model)
+    if PRESSURE in keys and is_proportional:
         k = keys.index(PRESSURE)
         if (values[:, k] > 0).all():
             factors, different[:, k] = values[:, k], 1.0
@@ -215,7 +223,8 @@ def ensemble(
 
     progress("samples", 0.0)
     work = partial(_solve, scene, keys, method)
-    if workers > 1 and len(different) > FEW:
+    few = 32  # samples up to which starting processes costs more than it saves
+    if workers > 1 and len(different) > few:
         engine.run_all(work, list(different), "processes", workers, done)
     else:
         with one_thread():
@@ -223,18 +232,12 @@ def ensemble(
                 done({k: work(sample)})
     if len(solved) < len(different):
         raise ValueError("workers were killed; provide more memory, or use fewer workers")
-    solutions = [solved[k] for k in range(len(different))]
-    arrays = {
-        name: _scale(
-            name, np.stack([vars(each)[name] for each in solutions])[place.ravel()], factors
-        )
-        for name in (field.name for field in fields(Solution))
-    }
+    arrays = {}
+    for name in (field.name for field in fields(Solution)):
+        own = np.stack([vars(solved[k])[name] for k in place.ravel().tolist()])
+        columns = own.T + 20 * np.log10(factors) if "level" in name else own.T * factors
+        arrays[name] = np.asarray(columns.T)  # levels are in dB
     return Ensemble(scene=scene, method=method, spreads=tuple(spreads), values=values, **arrays)
-
-
-def _is_proportional_to_pressure(scene: Scene, method: Method) -> bool:
-    return method.mapped or is_linear(scene, method.options.model)
 
 
 def is_linear(scene: Scene, name: str) -> bool:
@@ -243,12 +246,6 @@ def is_linear(scene: Scene, name: str) -> bool:
     linear = (model.is_reduced or model.is_infinite or model.is_steady) and not model.is_nonlinear
     alone = not (scene.load.gravity or scene.load.support_motion)
     return scene.reading.is_plain and linear and alone
-
-
-def _scale(name: str, values: Floats, factors: Floats) -> Floats:
-    """Multiply values (n, ...) of a solution by factors (n,) of the pressure; levels are in dB."""
-    columns = values.T + 20 * np.log10(factors) if "level" in name else values.T * factors
-    return np.asarray(columns.T)
 
 
 def _solve(scene: Scene, keys: tuple[str, ...], method: Method, values: Floats) -> Solution:
@@ -273,7 +270,7 @@ def rows_of(found: Ensemble) -> list[dict[str, Any]]:
     if found.is_skin:
         columns["level_db"] = found.level
         if found.has_map:
-            x, y = map_axes(scene)
+            x, y = found.method.map_axes(scene)
             cell = 1e4 * (x[1] - x[0]) * (y[1] - y[0])
             columns["above_threshold_cm2"] = cell * (found.map_level >= 0).sum(axis=(1, 2))
     columns |= {f"{name}_{unit}": scale * found.lines[:, k] for k, name in enumerate(names)}
@@ -294,14 +291,11 @@ def waveform_times(scene: Scene) -> Floats:
     return times[times >= times[-1] - SHOWN]
 
 
-def map_axes(scene: Scene) -> tuple[Floats, Floats]:
-    """Return the coordinates (nx,) and (ny,) in m of the map."""
-    return grid(scene, MAP.reach, STEP)
-
-
 def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solution:
     """Solve one sample, with the reduced-order model of the family if the body belongs to it
-    (`together`); raise a ValueError if the model refuses the scene.
+    (`together`).
+
+    Raises a ValueError if the model refuses the scene.
     """
     if not (method.mapped or method.family):
         return _compute(scene, method)
@@ -309,7 +303,7 @@ def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solu
     in_pulses, steady = (f, a), scene.during_pulses
     if steady is not scene:
         in_pulses = _steady_lines(steady, method, together)
-    p, (x, y) = len(scene.probes), map_axes(scene)
+    p, (x, y) = len(scene.probes), method.map_axes(scene)
     shape = (len(y), len(x)) if method.mapped else (0, 0)
     rms, levels = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2), _highest_level(*in_pulses)
     return Solution(
@@ -339,20 +333,19 @@ def _steady_lines(scene: Scene, method: Method, together: bool) -> tuple[Floats,
 
 def _map_lines(scene: Scene, method: Method) -> tuple[Floats, Complex]:
     """Return the lines by the wavenumber integral at probes and map."""
-    x, y = map_axes(scene)
-    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    places = np.stack(np.meshgrid(*method.map_axes(scene)), axis=-1).reshape(-1, 2)
     points, waves = np.vstack([scene.probe_points, places]), compliance(scene.body)
+    threshold = method.negligible_ratio
     if method.same_load:
-        operator = _operator(scene.pressure, tuple(map(tuple, points.tolist())))
-        return operator(waves)
-    return steady_lines(waves, scene.pressure, points, threshold=NEGLIGIBLE_LINE)
+        return _operator(scene.pressure, tuple(map(tuple, points.tolist())), threshold)(waves)
+    return steady_lines(waves, scene.pressure, points, threshold=threshold)
 
 
 @lru_cache(maxsize=2)
 def _operator(
-    pressure: MovingPressure, points: tuple[tuple[float, ...], ...]
+    pressure: MovingPressure, points: tuple[tuple[float, ...], ...], threshold: float
 ) -> Callable[[Compliance], tuple[Floats, Complex]]:
-    return path_operator(pressure, points, threshold=NEGLIGIBLE_LINE)
+    return path_operator(pressure, points, threshold=threshold)
 
 
 def _compute(scene: Scene, method: Method) -> Solution:
@@ -383,7 +376,7 @@ def _amplitudes_at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats
     """Return amplitudes (g, p) at frequencies (g,), from those of lines at f (f,); 0 elsewhere."""
     near = np.abs(f - frequencies[:, None]) < 1e-6 * np.maximum(frequencies, 1.0)[:, None]
     values = near @ amplitudes
-    return np.where(values > ROUND_OFF * values.max(initial=0.0), values, 0.0)
+    return np.where(values > 1e-12 * values.max(initial=0.0), values, 0.0)  # else round-off
 
 
 def _highest_level(frequencies: ArrayLike, lines: Complex | Floats) -> Floats:

@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-MOST_ROWS = 20  # in a notebook
-RESULTS = ("peak_um", "rms_um", "level_db", "expected_error")  # columns in a notebook
-
 Values = Sequence[float | str] | str
 
 
@@ -102,21 +99,19 @@ class SweepTable:
         return f"<SweepTable: {text}{f', {len(self.failed)} failed' * bool(self.failed)}>"
 
     def _repr_html_(self) -> str:
-        names = [*self.varied, *(name for name in RESULTS if name in self.columns)]
+        most_rows, results = 20, ("peak_um", "rms_um", "level_db", "expected_error")
+        known = [name for name in results if name in self.columns]
         rows = [
-            [
-                cell_text(row.get(name) if name in self.varied else value(row, name))
-                for name in names
-            ]
-            for row in self.rows[:MOST_ROWS]
-        ]
+            [*(cell_text(row.get(key)) for key in self.varied),
+             *(cell_text(value(row, name)) for name in known)]
+            for row in self.rows[:most_rows]
+        ]  # fmt: skip
         image = b""
         if len(self.failed) < len(self):
             image = drawing.picture(lambda figure: self.plot(ax=figure.subplots()), 4.5, 3.0)
+        table = drawing.table(rows, [*self.varied, *known])
         errors = tuple(dict.fromkeys(self.failed))
-        return drawing.page(
-            f"Sweep of {len(self)} runs", image, [drawing.table(rows, names)], errors
-        )
+        return drawing.page(f"Sweep of {len(self)} runs", image, [table], errors)
 
 
 def sweep(

@@ -10,6 +10,7 @@ import numpy as np
 from simple_model import Effort, Response, named_lines, point_kernel
 from simple_model.load.sampling import step
 from simple_model.quantities import DISPLACEMENT, Quantity
+from simple_model.response import SETTLE
 from skinwave.models.options import sample_times
 from skinwave.results.comparison import compare, spread, steady_rms
 from skinwave.results.run import ASSESSED, SUPPORT, Run
@@ -19,11 +20,6 @@ from skinwave.sweeps import dataset
 from skinwave.system import extensions
 from skinwave.system.extensions import Registry
 from skinwave.system.failures import reason
-
-WEAKEST_LINE = 1e-2  # of the strongest line of the load: weaker ones have no columns
-MOST_LINES = 40  # with columns
-SETTLE = 0.25  # part of a response that is left out of its largest value
-COST = ("dofs", "reduced_dofs", "steps", "solver", "energy_imbalance", "radiated")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +70,7 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
 
     The lines are the strongest of the load, those of the claims, and that of a moving support.
     """
+    weakest_ratio, most_lines = 1e-2, 40  # to the strongest line of the load
     kernel, of_body = response, response.record.of_body
     if of_body:
         kernel = point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
@@ -102,7 +99,7 @@ def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
         row["level_db"] = np.max(list(levels.values()), axis=0)
         row["sensation_line"] = max(levels, key=lambda name: levels[name].max())
     kernel_lines = replace(run, response=kernel).lines if of_body else run.lines
-    strong = named_lines(scene.pressure, WEAKEST_LINE, most=MOST_LINES, candidates=ASSESSED)
+    strong = named_lines(scene.pressure, weakest_ratio, most=most_lines, candidates=ASSESSED)
     for name in (name for name in run.lines if name in {*strong, SUPPORT}):
         row[f"{name}_hz"] = run.frequencies[name]
         if name in kernel_lines:
@@ -151,11 +148,12 @@ def unit_of(record: Quantity) -> str:
 
 
 def _cost(effort: Effort) -> dict[str, Any]:
-    return {name: getattr(effort, name) for name in COST} | {
-        "reduction_error": effort.estimate,
-        "peak_memory_gib": effort.peak_memory / 2**30,
-        "warnings": "; ".join(effort.warnings),
-    }
+    return {
+        "dofs": effort.dofs, "reduced_dofs": effort.reduced_dofs, "steps": effort.steps,
+        "solver": effort.solver, "energy_imbalance": effort.energy_imbalance,
+        "radiated": effort.radiated, "reduction_error": effort.estimate,
+        "peak_memory_gib": effort.peak_memory / 2**30, "warnings": "; ".join(effort.warnings),
+    }  # fmt: skip
 
 
 def _peak(response: Response) -> Any:

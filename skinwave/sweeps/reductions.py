@@ -27,11 +27,6 @@ from skinwave.scene.variation import DesignPoint
 from skinwave.system.effort import Progress
 from skinwave.system.failures import reason
 
-PER_WORKER = 3  # fewest bodies of a family: fewer are faster alone, one on each worker
-CACHED = 4  # bodies that a worker caches in memory, on two meshes each
-NEGLIGIBLE_LINE = 1e-2  # of the strongest line of a load: weaker ones need no finer mesh
-ROUND_OFF = 1e-9  # of a length
-
 Values = tuple[tuple[str, float], ...]  # of free keys
 # Each with the values of its bodies. A body is a scene `without_tacton`.
 Families = list[tuple[Covering, dict[Scene, Values]]]
@@ -55,9 +50,6 @@ class Mesh:
     values: Values = ()
 
 
-KILLED = Mesh(error="each worker was killed; provide more memory, or use larger elements")
-
-
 def model_of(scene: Scene, options: SolveOptions) -> str:
     """Return the model from rest of a scene, for "auto" that of its plan."""
     if options.model != "auto":
@@ -69,13 +61,9 @@ def model_of(scene: Scene, options: SolveOptions) -> str:
 def reduced_scene(point: DesignPoint, options: SolveOptions) -> Scene | None:
     """Return the scene of a run `without_tacton`, or None if its model reduces no body."""
     scene = point.scene
-    if (
-        scene is None
-        or not named(model_of(scene, options)).is_reduced
-        or not scene.body.of_kind.discretise
-    ):
-        return None
-    return without_tacton(scene)
+    if scene and named(model_of(scene, options)).is_reduced and scene.body.of_kind.discretise:
+        return without_tacton(scene)
+    return None
 
 
 def shared_meshes(
@@ -85,10 +73,10 @@ def shared_meshes(
     distribute: Distribute,
     progress: Progress,
 ) -> dict[str, Mesh | None]:
-    """Reduce each body of the runs once, families of bodies together, and return the mesh of each
-    run, those on one body together. Runs whose model reduces no body have none.
+    """Reduce each body of the runs once, families of bodies together, and return their meshes.
 
-    `distribute` calls a function of items on `count` workers.
+    Runs on one body follow each other. A run has no mesh if its model reduces no body. `distribute`
+    calls a function of items on `count` workers.
     """
     progress("reduce bodies", 0.0)
     subjects = {name: reduced_scene(point, options) for name, point in runs.items()}
@@ -105,7 +93,8 @@ def shared_meshes(
             progress("reduce bodies", len(made) / len(items))
 
         distribute(partial(_mesh_or_error, work, options), items, done)
-        return [made.get(k, KILLED) for k in range(len(items))]
+        cause = "each worker was killed; provide more memory, or use larger elements"
+        return [made.get(k, Mesh(error=cause)) for k in range(len(items))]
 
     together = families(hardest, options.tolerance, count)
     family_meshes = meshes_of(mesh_of_family, [family for family, _ in together])
@@ -125,9 +114,10 @@ def shared_meshes(
 
 
 def _highest_line(point: DesignPoint) -> float:
-    """Return the highest relevant line of a load in Hz."""
+    """Return the highest line of a load in Hz that needs a finer mesh."""
     assert point.scene
-    return max(named_lines(point.scene.pressure, NEGLIGIBLE_LINE).values(), default=0.0)
+    weakest_ratio = 1e-2  # to the strongest line
+    return max(named_lines(point.scene.pressure, weakest_ratio).values(), default=0.0)
 
 
 def _mesh_or_error(
@@ -188,7 +178,7 @@ def _reduce_twice(scene: Scene, options: SolveOptions, mesh: Mesh) -> list[Reduc
     ]
 
 
-@lru_cache(maxsize=2 * CACHED)
+@lru_cache(maxsize=8)  # four bodies on two meshes
 def prepare_body(
     subject: Scene, h: float, tolerance: float, solver: str, family: Covering | None, values: Values
 ) -> ReducedBody:
@@ -198,10 +188,13 @@ def prepare_body(
     return reduce_scene(subject, SolveOptions(h=h, tolerance=tolerance, solver=solver))
 
 
-def families(hardest: Mapping[Scene, DesignPoint], tolerance: float, workers: int = 1) -> Families:
+def families(
+    hardest: Mapping[Scene, DesignPoint], tolerance: float, workers: int = 1, *, per_worker: int = 3
+) -> Families:
     """Group bodies into families, given the run with the highest line of each body.
 
-    A family has many thicknesses if this saves time, otherwise one.
+    A family has many thicknesses if this saves time, otherwise one. Fewer bodies than `per_worker`
+    for each worker are faster alone.
     """
     found: Families = []
     for moving in (True, False):
@@ -216,7 +209,7 @@ def families(hardest: Mapping[Scene, DesignPoint], tolerance: float, workers: in
                 kind = keys, rest, subject.probes, subject.reading, subject.load
                 groups.setdefault(kind, {})[subject] = point
         for (keys, *_), members in groups.items():
-            if len(members) >= PER_WORKER * workers:
+            if len(members) >= per_worker * workers:
                 found += _family(members, keys, tolerance)
     return found
 
@@ -237,7 +230,7 @@ def _free_keys_of(
 ) -> tuple[FreeKey, ...]:
     """Return the varied keys that can be free in a family, with those that move a mesh if `moving`.
 
-    There are none unless these keys explain all differences between the bodies.
+    Returns none unless these keys explain all differences between the bodies.
     """
     if not point.before:
         return ()
@@ -254,7 +247,7 @@ def _free_keys_of(
     if not keys:
         return ()
     own = with_values(before, keys, dict(_values(point, keys)))
-    alike = np.allclose(own.thicknesses, body.thicknesses, ROUND_OFF, 0)
+    alike = np.allclose(own.thicknesses, body.thicknesses, rtol=1e-9, atol=0)
     return keys if own.solids == body.solids and alike else ()
 
 

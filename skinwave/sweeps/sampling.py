@@ -16,10 +16,7 @@ from skinwave.scene.variation import MOST_RUNS, combinations
 from skinwave.typing import Floats, Ints
 
 ENDS = (0.05, 0.95)  # quantiles of a number that is varied alone
-RESAMPLES = 200  # of the bootstrap
-HALF_WIDTH = 1.96  # standard errors of a 95 % interval
 PERCENTILES = (5, 25, 50, 75, 95)
-ROUND_OFF = 1e-12  # of the largest value
 
 
 def percentiles(values: Floats) -> Floats:
@@ -42,6 +39,11 @@ def check(spreads: Sequence[Spread], n: int, seed: int) -> None:
         )
     if not 2 <= n <= MOST_RUNS:
         raise ValueError(f"--samples is {n:,}; give a number from 2 to {MOST_RUNS:,}")
+    check_seed(seed)
+
+
+def check_seed(seed: int) -> None:
+    """Raise a ValueError if the seed of random samples is negative."""
     if seed < 0:
         raise ValueError(f"--seed is {seed}; give 0 or a positive whole number")
 
@@ -67,11 +69,12 @@ class SobolIndices:
     n: int
 
 
-def sobol_indices(values: Floats, d: int, seed: int = 0) -> SobolIndices:
+def sobol_indices(values: Floats, d: int, seed: int = 0, resamples: int = 200) -> SobolIndices:
     """Estimate the Sobol' indices of one output from its values (n (d + 2),) at the samples of
-    `saltelli_shares` of d numbers; intervals are by bootstrap.
+    `saltelli_shares` of d numbers.
 
-    All indices are 0 if the output is constant.
+    Intervals are by bootstrap. All indices are 0 if the output is constant. Raises a ValueError if
+    the number of values is wrong, or one is not finite.
     """
     n, rest = divmod(len(values), d + 2)
     if rest or not np.isfinite(values).all():
@@ -81,10 +84,10 @@ def sobol_indices(values: Floats, d: int, seed: int = 0) -> SobolIndices:
         )
     matrices = values.reshape(d + 2, n)
     matrices = matrices - matrices[:2].mean()  # a large mean costs digits
-    matrices[np.abs(matrices) <= ROUND_OFF * np.abs(values).max(initial=0.0)] = 0.0
+    matrices[np.abs(matrices) <= 1e-12 * np.abs(values).max(initial=0.0)] = 0.0  # round-off
     first, total = _estimates(matrices, np.arange(n)[None])[..., 0]
-    picks = np.random.default_rng(seed).integers(n, size=(RESAMPLES, n))
-    errors = HALF_WIDTH * _estimates(matrices, picks).std(axis=2, ddof=1)
+    picks = np.random.default_rng(seed).integers(n, size=(resamples, n))
+    errors = 1.96 * _estimates(matrices, picks).std(axis=2, ddof=1)  # of 95 % intervals
     return SobolIndices(first=first, total=total, first_error=errors[0], total_error=errors[1], n=n)
 
 

@@ -1,7 +1,7 @@
 """Parameter sweep: many scenes in one table. Each body is reduced once, and each scene run once."""
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
@@ -18,12 +18,7 @@ from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.measures import input_columns, result_columns, waveform_columns
-from skinwave.sweeps.reductions import (
-    Mesh,
-    model_of,
-    on_mesh,
-    shared_meshes,
-)
+from skinwave.sweeps.reductions import Mesh, model_of, on_mesh, shared_meshes
 from skinwave.system.effort import Progress, silent
 from skinwave.system.failures import reason
 
@@ -63,7 +58,7 @@ class Sweep:
     workers : number of runs at a time on this machine; all cores by default
     command : `record.command_entry` for the record.json of a new folder
     all_columns : whether files also have the columns with one value in all rows
-    waveforms : whether to write the waveforms, too, into a dataset of the folder
+    waveforms : whether to write the waveforms into another table of the folder
     """
 
     folder: Path
@@ -118,17 +113,15 @@ class Sweep:
             "asked_h_mm": 1e3 * self.options.h if self.options.h else None,
         }  # fmt: skip
 
-        def write(rows: Iterable[dict[str, Any]]) -> None:
-            numbered, waves = list[dict[str, Any]](), list[dict[str, Any]]()
-            for row in rows:
-                place = {"index": index[row["key"]], "key": row["key"]}
-                waves.append(place | row.pop("waveforms", {}))
-                numbered.append(place | constant | row)
-            if numbered and self.waveforms:  # first: a run with a row has its waveforms, too
-                dataset.append(waveforms, waves)
-            if numbered:
+        def write(rows: Collection[dict[str, Any]]) -> None:
+            places = [{"index": index[row["key"]], "key": row["key"]} for row in rows]
+            waves = [row.pop("waveforms", {}) for row in rows]
+            if rows and self.waveforms:  # first: a run with a row has its waveforms, too
+                dataset.append(waveforms, [p | own for p, own in zip(places, waves, strict=True)])
+            if rows:
+                numbered = [p | constant | row for p, row in zip(places, rows, strict=True)]
                 dataset.append(self.folder, numbered)
-            for row in numbered:
+            for row in rows:
                 tally[row["status"]] += 1
             self.progress("run", sum(tally.values()) / max(len(missing), 1))
 
@@ -138,7 +131,7 @@ class Sweep:
         interrupted = False
         try:
             runs = {name: point for name, point in missing.items() if point.scene}
-            write({"key": n} | input_columns(missing[n]) for n in missing if n not in runs)
+            write([{"key": n} | input_columns(missing[n]) for n in missing if n not in runs])
             meshes = shared_meshes(runs, self.options, count, distribute, self.progress)
             write([])
             work = partial(_row, self.options, self.assessed, self.waveforms)

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -14,14 +13,9 @@ from simple_model.choices import choose
 from simple_model.drawing import small
 from simple_model.threshold import BAND
 from skinwave.report.column_labels import at_probe, axis_label, column_unit
+from skinwave.report.figures import with_style
 from skinwave.report.styles import Style
 from skinwave.sweeps.dataset import Row
-
-SPEED = "tacton.speed_m_per_s"
-MARKERS = "osD^vP*X"
-MOST_NAMED = len(MARKERS)  # curves in a legend; more numbers have a colour bar
-MOST_TICKS = 12
-LEAST_FILLED = 0.5  # share of the cells of a grid that have a run
 
 
 def varied_keys(rows: Sequence[Row]) -> list[str]:
@@ -53,6 +47,7 @@ def value(row: Row, column: str) -> float:
     return float(np.max(numbers)) if numbers else np.nan
 
 
+@with_style
 def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style: Style) -> Figure:
     """Draw a column over key x, with a curve for each value of key `by`, as `curves`.
 
@@ -60,25 +55,29 @@ def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style:
     waves. Raises a ValueError if the column has no numbers.
     """
     _check(rows, (column, x, *([by] if by else [])))
-    with mpl.rc_context(style.rc):
-        figure = Figure(figsize=style.size(6.4, 4.4), layout="constrained")
-        ax = figure.subplots()
-        if at_probe(column)[0].endswith("_db"):
-            ax.axhspan(-BAND, BAND, color="0.5", alpha=0.25, lw=0,
-                       label=f"threshold, ±{BAND:g} dB between people")  # fmt: skip
-        waves = {value(row, "rayleigh_speed_m_per_s") for row in rows} if x == SPEED else set()
-        for k, wave in enumerate(sorted(filter(np.isfinite, waves))):
-            label = "_" if k else "Rayleigh speed $c_R$ without loss"
-            ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=label)
-        curves(ax, rows, column, x, by)
-        ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
+    figure = Figure(figsize=style.size(6.4, 4.4), layout="constrained")
+    ax = figure.subplots()
+    if at_probe(column)[0].endswith("_db"):
+        ax.axhspan(-BAND, BAND, color="0.5", alpha=0.25, lw=0,
+                   label=f"threshold, ±{BAND:g} dB between people")  # fmt: skip
+    waves = {value(row, "rayleigh_speed_m_per_s") for row in rows}
+    waves = waves if x == "tacton.speed_m_per_s" else set()
+    for k, wave in enumerate(sorted(filter(np.isfinite, waves))):
+        label = "_" if k else "Rayleigh speed $c_R$ without loss"
+        ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=label)
+    curves(ax, rows, column, x, by)
+    ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
     return figure
 
 
-def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) -> Figure:
+@with_style
+def heat_figure(
+    rows: Sequence[Row], column: str, x: str, y: str, style: Style, least_filled: float = 0.5
+) -> Figure:
     """Draw a map of a column over two keys: cells are means of runs, or empty.
 
-    Raises a ValueError if the column has no numbers, or the runs do not lie on a grid.
+    Raises a ValueError if the column has no numbers, or if less than the share `least_filled` of
+    the cells has a run.
     """
     _check(rows, (column, x, y))
     across, up = _levels(rows, x), _levels(rows, y)
@@ -86,49 +85,49 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
     for row in rows:
         where = up.index(_plain(row.get(y))), across.index(_plain(row.get(x)))
         cells.setdefault(where, []).append(value(row, column))
-    if len(cells) < LEAST_FILLED * len(across) * len(up):
+    if len(cells) < least_filled * len(across) * len(up):
         raise ValueError(f"the runs do not lie on a grid of {x} and {y}; remove --heat")
     table = np.full((len(up), len(across)), np.nan)
     for where, values in cells.items():
         table[where] = np.mean(values)
-    with mpl.rc_context(style.rc):
-        figure = Figure(figsize=style.size(6.4, 4.8), layout="constrained")
-        ax = figure.subplots()
-        drawn = np.where(np.isfinite(table), table, np.nan)
-        image = ax.pcolormesh(drawn, cmap="viridis", edgecolors="face", linewidth=0.3)
-        for axis, levels in ((ax.xaxis, across), (ax.yaxis, up)):
-            step = -(-len(levels) // MOST_TICKS)  # names in the middle of cells
-            names = [f"{x:g}" if isinstance(x, float) else str(x) for x in levels[::step]]
-            axis.set_ticks(np.arange(0, len(levels), step) + 0.5, names)
-        ax.set(xlabel=axis_label(x), ylabel=axis_label(y))
-        figure.colorbar(image, ax=ax, label=axis_label(column))
+    figure = Figure(figsize=style.size(6.4, 4.8), layout="constrained")
+    ax = figure.subplots()
+    drawn = np.where(np.isfinite(table), table, np.nan)
+    image = ax.pcolormesh(drawn, cmap="viridis", edgecolors="face", linewidth=0.3)
+    most_ticks = 12
+    for axis, levels in ((ax.xaxis, across), (ax.yaxis, up)):
+        step = -(-len(levels) // most_ticks)  # names in the middle of cells
+        names = [f"{x:g}" if isinstance(x, float) else str(x) for x in levels[::step]]
+        axis.set_ticks(np.arange(0, len(levels), step) + 0.5, names)
+    ax.set(xlabel=axis_label(x), ylabel=axis_label(y))
+    figure.colorbar(image, ax=ax, label=axis_label(column))
     return figure
 
 
+@with_style
 def best_figure(rows: Sequence[Row], bests: Sequence[Any], style: Style) -> Figure:
     """Draw the column of a search over its one or two keys, with each `Best`, their intervals and,
     over two keys, the best values of the samples as dots.
     """
     column, keys = bests[0].column, [best.key for best in bests]
     names, at = [*keys, column][:2], [*(best.value for best in bests), bests[0].result][:2]
-    with mpl.rc_context(style.rc):
-        figure = Figure(figsize=style.size(6.4, 4.6), layout="constrained")
-        ax = figure.subplots()
-        if len(keys) == 1:
-            curves(ax, rows, column, keys[0], None)
-        else:
-            cells = np.array([[value(row, name) for name in (*keys, column)] for row in rows])
-            x, y, z = cells[np.isfinite(cells).all(axis=1)].T
-            levels = ax.tricontourf(x, y, z, levels=20, cmap="viridis")
-            figure.colorbar(levels, ax=ax, label=axis_label(column))
-            ax.plot(*(best.drawn for best in bests), "w.", ms=3, alpha=0.6)
-        for k, best in enumerate(bests):
-            ends = np.array([at, at])
-            ends[:, k] = best.interval or best.value
-            ax.plot(*ends.T, "r.-", lw=1)
-        ax.plot(*at, "r*", ms=9, label="best" + ", 95 % interval" * bool(bests[0].interval))
-        ax.legend(fontsize=small())
-        ax.set(xlabel=axis_label(names[0]), ylabel=axis_label(names[1]))
+    figure = Figure(figsize=style.size(6.4, 4.6), layout="constrained")
+    ax = figure.subplots()
+    if len(keys) == 1:
+        curves(ax, rows, column, keys[0], None)
+    else:
+        cells = np.array([[value(row, name) for name in (*keys, column)] for row in rows])
+        x, y, z = cells[np.isfinite(cells).all(axis=1)].T
+        levels = ax.tricontourf(x, y, z, levels=20, cmap="viridis")
+        figure.colorbar(levels, ax=ax, label=axis_label(column))
+        ax.plot(*(best.drawn for best in bests), "w.", ms=3, alpha=0.6)
+    for k, best in enumerate(bests):
+        ends = np.array([at, at])
+        ends[:, k] = best.interval or best.value
+        ax.plot(*ends.T, "r.-", lw=1)
+    ax.plot(*at, "r*", ms=9, label="best" + ", 95 % interval" * bool(bests[0].interval))
+    ax.legend(fontsize=small())
+    ax.set(xlabel=axis_label(names[0]), ylabel=axis_label(names[1]))
     return figure
 
 
@@ -139,7 +138,8 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
     """
     groups = _levels(rows, by) if by else [None]
     words = not isinstance(_levels(rows, x)[0], float)
-    many = len(groups) > MOST_NAMED and all(isinstance(group, float) for group in groups)
+    markers = "osD^vP*X"  # more curves of numbers have a colour bar in place of a legend
+    many = len(groups) > len(markers) and all(isinstance(group, float) for group in groups)
     scale = ScalarMappable(Normalize(groups[0], groups[-1]) if many else None, "viridis")
     colours = (
         scale.to_rgba(np.array(groups)) if many else scale.cmap(np.linspace(0, 0.88, len(groups)))
@@ -155,7 +155,7 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
         mean, low, high = (np.array([f(v) for v in groups_at]) for f in (np.mean, np.min, np.max))
         label = None if by is None or many else _with_unit(by, group)
         ax.plot(places, np.where(np.isfinite(mean), mean, np.nan), color=colours[k],
-                marker="o" if many else MARKERS[k % len(MARKERS)], ms=4, lw=1.5,
+                marker="o" if many else markers[k % len(markers)], ms=4, lw=1.5,
                 ls="solid" if joined else "none", label=label)  # fmt: skip
         if max(map(len, groups_at)) > 1:
             ax.fill_between(places, low, high, color=colours[k], alpha=0.15, lw=0)

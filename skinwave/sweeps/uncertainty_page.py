@@ -21,38 +21,16 @@ from skinwave.sweeps.uncertainty_figures import bands_figure, maps_figure, torna
 from skinwave.system.document import Choice, Details, Part, Picture, Report, Section
 from skinwave.system.table import Column, Table
 
-BANDS = (
-    "Bands of the samples at each time, and bars of each line. The dark part contains half of the "
-    "samples, light and dark together nine of ten. Each time and each line has its own band, so no "
-    "single sample follows an edge."
-)
-MAPS = (
-    "Percentiles of the RMS motion at each place, and the share of samples in which a place is "
-    "above the detection threshold. Dotted: path of the focus."
-)
-ONE_AT_A_TIME = (
-    "One number at a time at its 5 % and 95 % quantiles, all others at their central values. The "
-    "widest bar shows which number to measure first."
-)
-INDICES = (
-    "Sobol' indices with half widths of 95 % intervals. First order: the share of the variance "
-    "that vanishes if this number is known. Total: the share that remains if all others are known. "
-    "If the first orders sum to more than 1 beyond their intervals, there are too few samples."
-)
-MOST_LINES = 12  # in the table of a page
-PROBE = [Column("probe_x_mm", "x", "mm"), Column("probe_y_mm", "y", "mm")]
-P_COLUMNS = [Column(f"p{k}", f"{k} %") for k in PERCENTILES]
 MEDIAN = 6  # place of the median in a row of percentiles
-PERCENTILE_FILE, INDEX_FILE, PAGE = "percentiles.csv", "indices.csv", "uncertainty.html"
-SAMPLED_FILES = (PERCENTILE_FILE, INDEX_FILE, PAGE)
-SCALARS = ("rms_um", "level_db", "spread_6db_mm", "peak_um", "kernel_misfit", "kernel_rms_pa")
-SHARES = ("first_order", "first_order_95", "total", "total_95")
-ABOVE = "above_threshold_cm2"  # a column
+SAMPLED_FILES = PERCENTILE_FILE, INDEX_FILE, PAGE = (
+    "percentiles.csv", "indices.csv", "uncertainty.html",
+)  # fmt: skip
 
 
 def write_ensemble(folder: Path, scene: Scene, n: int, **options: Any) -> list[Part]:
-    """Write percentiles.csv and samples.csv of an ensemble, with the options of `propagate`; return
-    the parts of its page.
+    """Write percentiles.csv and samples.csv of an ensemble, and return the parts of its page.
+
+    The options are those of `propagate`.
     """
     found = propagate(scene, n, **options)
     rows = rows_of(found)
@@ -61,8 +39,21 @@ def write_ensemble(folder: Path, scene: Scene, n: int, **options: Any) -> list[P
     return [Section("Uncertainty", list(_ensemble_parts(found, rows)))]
 
 
-def _ensemble_parts(found: Ensemble, rows: Sequence[Row]) -> Iterator[Part]:
+def _ensemble_parts(found: Ensemble, rows: Sequence[Row], most_lines: int = 12) -> Iterator[Part]:
     keys, p = [s.key for s in found.spreads], found.strongest
+    about_bands = (
+        "Bands of the samples at each time, and bars of each line. The dark part contains half of "
+        "the samples, light and dark together nine of ten. Each time and each line has its own "
+        "band, so no single sample follows an edge."
+    )
+    about_maps = (
+        "Percentiles of the RMS motion at each place, and the share of samples in which a place is "
+        "above the detection threshold. Dotted: path of the focus."
+    )
+    about_tornado = (
+        "One number at a time at its 5 % and 95 % quantiles, all others at their central values. "
+        "The widest bar shows which number to measure first."
+    )
     yield " ".join(sentences(found))
     yield Table(
         ["uncertain number", "central value", "distribution", "part", "source"],
@@ -70,18 +61,20 @@ def _ensemble_parts(found: Ensemble, rows: Sequence[Row]) -> Iterator[Part]:
          for s in found.spreads],
     )  # fmt: skip
     varied = ensemble(found.scene, found.spreads, one_at_a_time(found.spreads), found.method)
-    pictures = {"bands": Picture(png(bands_figure(found, varied.waveform[0])), BANDS, "bands")}
+    bands = png(bands_figure(found, varied.waveform[0]))
+    pictures = {"bands": Picture(bands, about_bands, "bands")}
     if found.has_map:
-        pictures["maps"] = Picture(png(maps_figure(found)), MAPS, "bands-map")
+        pictures["maps"] = Picture(png(maps_figure(found)), about_maps, "bands-map")
     (rms, *_), ends = (name for name in rows[0] if name.startswith("rms_")), rows_of(varied)
-    outputs = [f"{rms}[{p}]", *(name for name in ("level_db", ABOVE) if name in rows[0])]
+    others = [name for name in ("level_db", "above_threshold_cm2") if name in rows[0]]
+    outputs = [f"{rms}[{p}]", *others]
     charts = {axis_label(name): np.array([value(row, name) for row in ends]) for name in outputs}
     tornado = png(tornado_figure(charts, keys))
-    pictures["one number at a time"] = Picture(tornado, ONE_AT_A_TIME, "tornado")
+    pictures["one number at a time"] = Picture(tornado, about_tornado, "tornado")
     yield Choice("uncertainty", pictures)
     table, (x, y) = row_percentiles(rows), found.scene.probes[p]
     lines = [row for row in table.rows if row[1] is not None and row[2:4] == (1e3 * x, 1e3 * y)]
-    lines = sorted(lines, key=lambda row: -row[MEDIAN])[:MOST_LINES]
+    lines = sorted(lines, key=lambda row: -row[MEDIAN])[:most_lines]
     yield Details("Percentiles of lines", [_with_labels(Table(table.columns, lines))])
 
 
@@ -116,8 +109,9 @@ def sentences(found: Ensemble) -> list[str]:
 def write_uncertainty(
     out: Path, rows: Sequence[Row], spreads: Sequence[Spread], *, has_indices: bool
 ) -> list[str]:
-    """Write percentiles.csv, indices.csv and uncertainty.html of a sweep by distributions, given
-    its rows in the order of the design; return their names. Sobol' indices need every run.
+    """Write the files of a sweep by distributions, and return their names.
+
+    `rows` are in the order of the design. Sobol' indices need every run.
     """
     done = finished_rows(rows)
     failures = dataset.failures_of(rows)
@@ -137,7 +131,13 @@ def write_uncertainty(
     if has_indices and not failures:
         indices = index_table(rows, [s.key for s in spreads])
         files[INDEX_FILE] = indices.to_csv()
-        parts += [INDICES, _with_labels(indices)]
+        about = (
+            "Sobol' indices with half widths of 95 % intervals. First order: the share of the "
+            "variance that vanishes if this number is known. Total: the share that remains if all "
+            "others are known. If the first orders sum to more than 1 beyond their intervals, "
+            "there are too few samples."
+        )
+        parts += [about, _with_labels(indices)]
     parts.append(Details("Percentiles at every probe", [_with_labels(table)]))
     page = Report(f"Uncertainty of {out.name}", verdict, parts, failures=failures)
     files[PAGE] = page.html().encode()
@@ -148,18 +148,26 @@ def write_uncertainty(
 def index_table(rows: Sequence[Row], keys: Sequence[str]) -> Table:
     """Return Sobol' indices, with half widths of intervals, of scalar columns for each key."""
     found: list[tuple[object, ...]] = []
-    for name in SCALARS:
+    names = ("rms_um", "level_db", "spread_6db_mm", "peak_um", "kernel_misfit", "kernel_rms_pa")
+    for name in names:
         values = np.array([value(row, name) for row in rows])
         if np.isfinite(values).all():
             one = sobol_indices(values, len(keys))
             columns = (one.first, one.first_error, one.total, one.total_error)
             found += [(name, key, *each, one.n) for key, *each in zip(keys, *columns, strict=True)]
-    shares = [Column(name, name.replace("_", " ").replace("95", "±"), digits=2) for name in SHARES]
+    shares = [
+        Column(name, name.replace("_", " ").replace("95", "±"), digits=2)
+        for name in ("first_order", "first_order_95", "total", "total_95")
+    ]
     return Table(["column", "key", *shares, "samples"], found, stored=4)
 
 
 def row_percentiles(rows: Sequence[Row]) -> Table:
     """Return percentiles at each probe of the columns that all rows have: motion, level, lines."""
+    columns: list[Column | str] = [
+        "column", Column("frequency_hz", "frequency", "Hz"), Column("probe_x_mm", "x", "mm"),
+        Column("probe_y_mm", "y", "mm"), *(Column(f"p{k}", f"{k} %") for k in PERCENTILES),
+    ]  # fmt: skip
     found: list[tuple[object, ...]] = []
     x, y = (rows[0][f"probe_{axis}_mm"] for axis in "xy")
     for column in dict.fromkeys(name for row in rows for name in row):
@@ -173,4 +181,4 @@ def row_percentiles(rows: Sequence[Row]) -> Table:
             frequency = rows[0][lines[0]] if lines else None
             for p, band in enumerate(percentiles(values).T.tolist()):
                 found.append((column, frequency, x[p], y[p], *band))
-    return Table(["column", Column("frequency_hz", "frequency", "Hz"), *PROBE, *P_COLUMNS], found)
+    return Table(columns, found)

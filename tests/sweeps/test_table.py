@@ -79,7 +79,7 @@ def test_missing_packages_and_schedulers_are_refused(scene, refused, monkeypatch
         patch.setattr(engine, "find_spec", lambda name: None)
         assert "skinwave[sweep]" in refused("sweep", scene, *vary, "threads")
         assert "skinwave[cluster]" in refused("sweep", scene, *vary, "tcp://a:1")
-    monkeypatch.setattr(engine, "CONNECTION_TIMEOUT", 0.5)
+    monkeypatch.setattr(engine, "_client", partial(engine._client, timeout=0.5))
     nowhere = "tcp://127.0.0.1:9"
     assert nowhere in refused("sweep", scene, *vary, nowhere)
     assert sorted(path.name for path in scene.parent.iterdir()) == ["short.toml"]
