@@ -3,24 +3,12 @@
 The docstring of a module is the help of its command. Slow imports are made in `run`.
 """
 
-from skinwave.commands import (
-    compare,
-    convert,
-    dispersion,
-    fit,
-    live,
-    mesh,
-    plan,
-    relax,
-    report,
-    run,
-    sweep,
-    verify,
-    web,
-)
+from importlib import import_module
 
-MODULES = (
-    run, compare, relax, dispersion, plan, sweep, mesh, convert, verify, report,
-    live, web, fit,
-)  # fmt: skip
-COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}
+COMMANDS = {
+    name: import_module(f"skinwave.commands.{name}")
+    for name in (
+        "run", "compare", "relax", "dispersion", "plan", "sweep", "mesh", "convert", "verify",
+        "report", "live", "web", "fit",
+    )
+}  # fmt: skip

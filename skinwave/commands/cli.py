@@ -19,12 +19,7 @@ from skinwave.system.plain_text import printable, say
 from skinwave.system.processes import SAFE_PATH, environment
 
 CACHE = "SKINWAVE_CACHE"
-NO_CACHE = (
-    f"do not read or write the cache of meshes, bodies and results, whose folder {CACHE} sets"
-)
-UNCACHED = ("convert",)  # commands that do not use the cache
 READER_GONE = 141  # 128 + SIGPIPE, the exit code of `yes` in `yes | head -1`
-DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -72,7 +67,8 @@ def _message(error: Exception) -> str:
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     place = "a file" if error.filename is None else error.filename
-    cure = "free space there" if error.errno in DISK_FULL else "check its name and permissions"
+    is_full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    cure = "free space there" if is_full else "check its name and permissions"
     return f"{place} cannot be read or written ({error.strerror}); {cure}"
 
 
@@ -126,7 +122,10 @@ def parser() -> argparse.ArgumentParser:
     for name, module in COMMANDS.items():
         command = commands.add_parser(name, help=(module.__doc__ or "").rstrip("."))
         module.options(command)
-        if name not in UNCACHED:
-            command.add_argument("--no-cache", action="store_true", help=NO_CACHE)
+        if name != "convert":  # which does not use the cache
+            command.add_argument(
+                "--no-cache", action="store_true", help="do not read or write the cache of meshes, "
+                f"bodies and results, whose folder {CACHE} sets",
+            )  # fmt: skip
         command.set_defaults(command=module.run)
     return parser

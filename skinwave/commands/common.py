@@ -13,7 +13,6 @@ from skinwave.models import names
 from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
-    from simple_model import Response
     from skinwave.models.options import SolveOptions
     from skinwave.planning.record import Plan
     from skinwave.scene.scene import Scene
@@ -123,16 +122,15 @@ def plan_of_command(options: argparse.Namespace, scene: "Scene", **more: Any) ->
     return found
 
 
+def paths_of(options: argparse.Namespace) -> list[Path]:
+    """Return the files and folders that options name, without the result."""
+    return [x for key, x in vars(options).items() if isinstance(x, Path) and key not in ("out", "default_out")]
+
+
 def warn(sentences: Iterable[str]) -> None:
     """Print warnings."""
     for sentence in sentences:
         say(f"skinwave: warning: {' '.join(sentence.split())}", sys.stderr)
-
-
-def accuracy(response: "Response") -> dict[str, Any]:
-    """Return the expected error, its parts and the warnings of a response for a summary in JSON."""
-    effort = response.effort
-    return {**effort.errors.summary(), "warnings": list(effort.warnings)}
 
 
 def note_scenes(options: argparse.Namespace) -> None:
@@ -171,18 +169,20 @@ def note_scenes(options: argparse.Namespace) -> None:
 def result_folder(
     options: argparse.Namespace,
     default: str | Path,
-    inputs: Iterable[str | Path] = (),
     scene: "Scene | None" = None,
+    inputs: Iterable[str | Path] = (),
 ) -> "Iterator[tuple[Path, Progress]]":
     """Yield the folder of a result, --out or the default, and a progress callback.
 
-    At the end the folder gets its record, unless it has one, and replaces the target.
+    At the end the folder gets its record, unless it has one, and replaces the target. It may not
+    contain files of the options, of the scene, or other `inputs`.
     """
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
 
     options.default_out = Path(default)
     options.out = options.out or options.default_out
+    inputs = [*paths_of(options), *(scene.files if scene else ()), *inputs]
     with output_folder(options.out, overwrite=options.overwrite, inputs=inputs) as folder:
         with progress_of(options) as progress:
             yield folder, progress
@@ -194,15 +194,11 @@ def closing(
     options: argparse.Namespace, sentences: list[str], failures: Mapping[str, str] | None = None,
     **summary: Any,
 ) -> int:  # fmt: skip
-    """Print the sentences and the page of a result, or everything as JSON; failed parts come first.
-
-    Returns the exit code: 1 if a part failed.
-    """
-    sentences = with_failures(failures, sentences)
-    summary = {"out": str(options.out), "sentences": sentences} | summary
-    summary["failures"] = dict(failures or {})
-    summarise(options, summary, "\n".join([*sentences, f"open {options.out}/index.html"]))
-    return 1 if failures else 0
+    """Print the sentences and the page of a result, or everything as JSON; see `summarise`."""
+    summary = {"out": str(options.out), "sentences": with_failures(failures, sentences)} | summary
+    return summarise(
+        options, summary, [*sentences, f"open {options.out}/index.html"], failures or {}
+    )
 
 
 def with_failures(failures: Mapping[str, str] | None, sentences: Iterable[str]) -> list[str]:
@@ -212,13 +208,23 @@ def with_failures(failures: Mapping[str, str] | None, sentences: Iterable[str]) 
     return [*filter(None, [failure_text(failures or {})]), *sentences]
 
 
-def summarise(options: argparse.Namespace, summary: dict[str, Any], text: str) -> None:
-    """Print a text, or the summary as JSON; keep both in the options."""
+def summarise(
+    options: argparse.Namespace, summary: dict[str, Any], lines: Iterable[str],
+    failures: Mapping[str, str] | None = None,
+) -> int:  # fmt: skip
+    """Print lines, or the summary as JSON, and keep both in the options; failed parts come first.
+
+    Returns the exit code: 1 if a part failed.
+    """
+    if failures is not None:
+        summary = summary | {"failures": dict(failures)}
+    text = "\n".join(with_failures(failures, lines))
     options.summary = summary, text
     if options.json:
         say(json.dumps(summary))
     elif not options.quiet:
         say(text)
+    return 1 if failures else 0
 
 
 def metre(millimetre: float | None) -> float | None:

@@ -4,16 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skinwave.commands.common import (
-    add_file_frame,
-    add_mesh,
-    add_model_name,
-    add_output,
-    closing,
-    result_folder,
-    solving,
-    warn,
-)
+from skinwave.commands import common
 
 if TYPE_CHECKING:
     from skinwave.measure.comparison import Measured
@@ -33,7 +24,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--body", metavar="BODY", help="replace the body: paper-sheet, skin-slab, palm, or a file "
         "with the surface of a hand (stl, ply, obj, glb, vtp) or a mesh (vtu, msh, inp, vtk)",
     )  # fmt: skip
-    add_file_frame(parser)
+    common.add_file_frame(parser)
     add("--measured", type=Path, metavar="FILE", help="compare with this measurement of the scene")
     add(
         "--delay", type=float, metavar="MS",
@@ -43,9 +34,9 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--gain", type=float, metavar="G",
         help="gain of the record relative to the body (default: fitted)",
     )  # fmt: skip
-    add_model_name(parser)
-    add_mesh(parser)
-    add_output(parser)
+    common.add_model_name(parser)
+    common.add_mesh(parser)
+    common.add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -63,7 +54,6 @@ def run(options: argparse.Namespace) -> int:
     given = None if options.scene == PAPER else read(options.scene)
     bodies = _chosen_body(options)
     measured = _read_measurement(options)
-    inputs = [body.file for body in bodies.values()]
     if given is None:
         scenes, out = paper_scenes(bodies or None), PAPER
         against = " and ".join(label(body) for body in bodies or paper15.MEASURED_ON)
@@ -74,23 +64,23 @@ def run(options: argparse.Namespace) -> int:
             scene = with_body(scene, body)
         scenes, title = own_scenes(scene, folder_name(scene.name)), scene.name
         out = f"{Path(options.scene).stem}-compared"
-        inputs += [options.scene, *given.files, options.measured or ""]
-    with result_folder(options, out, inputs, given) as (folder, progress):
+    inputs = [body.file for body in bodies.values()] + [options.scene] * (given is not None)
+    with common.result_folder(options, out, given, inputs) as (folder, progress):
         live = list(scenes[first_name(scenes)].values())
         if given is None:  # a palm takes minutes on the live page, a flat slab a second
             live.append(with_body(live[-1], BODIES["skin-slab"]))
         outcome = run_study(
-            scenes, folder, solving(options, progress, model=options.model), title=title,
+            scenes, folder, common.solving(options, progress, model=options.model), title=title,
             command=record.command_entry(options)["typed"], measured=measured, live=live,
         )  # fmt: skip
-    warn(outcome.warnings)
+    common.warn(outcome.warnings)
     claims = outcome.assessed_claims
     held, memory = sum(claim.holds for claim in claims), outcome.peak_memory / 2**30
     sentence = (
         f"{outcome.runs} of {outcome.planned} runs in {outcome.seconds:.0f} s, {memory:.2f} GiB; "
         f"{held} of {len(claims)} claims hold"
     )
-    code = closing(
+    code = common.closing(
         options, [*outcome.conclusions, sentence], outcome.failures, runs=outcome.runs,
         planned=outcome.planned, claims_held=held, claims_assessed=len(claims),
         warnings=outcome.warnings,

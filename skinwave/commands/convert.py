@@ -54,8 +54,7 @@ def run(options: argparse.Namespace) -> int:
         content, notes = convert(options.source, options.target, choices, base)
         file.write(content)
     summary = {"out": str(options.target), "bytes": len(content), "notes": notes}
-    summarise(options, summary, "\n  ".join([f"wrote {options.target}", *notes]))
-    return 0
+    return summarise(options, summary, ["\n  ".join([f"wrote {options.target}", *notes])])
 
 
 def _parameter(text: str) -> tuple[str, float]:

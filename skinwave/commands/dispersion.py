@@ -4,8 +4,6 @@ import argparse
 
 from skinwave.commands.common import add_output, add_scene, closing, result_folder
 
-MOST_MODES = 12
-
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
@@ -15,8 +13,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="highest frequency in Hz (default: 650)",
     )  # fmt: skip
     parser.add_argument(
-        "--modes", type=int, default=6, metavar="N",
-        help=f"number of modes, 1 to {MOST_MODES} (default: 6)",
+        "--modes", type=int, default=6, metavar="N", help="number of modes, 1 to 12 (default: 6)",
     )  # fmt: skip
     add_output(parser)
 
@@ -27,13 +24,11 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene.scene import check_load
     from skinwave.studies.dispersion import driven_modes, sentences, write
 
-    if not 1 <= options.modes <= MOST_MODES:
-        raise ValueError(f"--modes is {options.modes}; give a number from 1 to {MOST_MODES}")
+    if not 1 <= options.modes <= 12:
+        raise ValueError(f"--modes is {options.modes}; give a number from 1 to 12")
     scene = read(options.scene)
     check_load(scene, "dispersion")
     found = driven_modes(scene, highest=options.highest, most=options.modes)
-    name, inputs = f"{options.scene.stem}-dispersion", [options.scene, *scene.files]
-    with result_folder(options, name, inputs, scene) as (folder, _):
+    with result_folder(options, f"{options.scene.stem}-dispersion", scene) as (folder, _):
         write(folder, found)
-    closing(options, sentences(found))
-    return 0
+    return closing(options, sentences(found))

@@ -4,20 +4,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skinwave.commands.common import (
-    add_model_name,
-    add_output,
-    closing,
-    result_folder,
-    summarise,
-    warn,
-)
+from skinwave.commands import common
 from skinwave.system.formats import MEASUREMENTS, suffixes
 
 if TYPE_CHECKING:
     from skinwave.measure import Measurement
 
-KINDS = ("waveforms", "lines", "amplitudes")
 SIGNS = {"in": 1, "out": -1}
 TEXTS = (  # options about a file, each a text
     ("quantity", "NAME", "quantity in the file: displacement, velocity or acceleration"),
@@ -43,9 +35,10 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="compute a key from the varied keys",
     )  # fmt: skip
     add(
-        "--to", choices=KINDS, help="data to fit: waveforms (default), complex lines, or amplitudes"
-    )
-    add_model_name(parser)
+        "--to", choices=("waveforms", "lines", "amplitudes"),
+        help="data to fit: waveforms (default), complex lines, or amplitudes",
+    )  # fmt: skip
+    common.add_model_name(parser)
     add("--starts", type=int, default=8, metavar="N", help="starts of the search (default: 8)")
     add("--seed", type=int, default=0, help="seed of the starts (default: 0)")
     add(
@@ -61,7 +54,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--positive", choices=tuple(SIGNS), help="positive motion is into the body or out of it")
     add("--rate", type=float, metavar="HZ", help="samples per second")
     add("--direction", choices=("x", "y", "z"), help="direction of motion in a Universal File")
-    add_output(parser)
+    common.add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -79,16 +72,15 @@ def run(options: argparse.Namespace) -> int:
     check_seed(options.seed)
     scene = read(options.scene)
     measured = _read_measurement(options.measured, options)
-    name, inputs = f"{options.scene.stem}-fit", [options.scene, options.measured, *scene.files]
-    with result_folder(options, name, inputs, scene) as (folder, progress):
+    with common.result_folder(options, f"{options.scene.stem}-fit", scene) as (folder, progress):
         found = fit(
             scene, measured, options.vary, tie=options.tie, kind=options.to or "",
             model=options.model, starts=options.starts, seed=options.seed, progress=progress,
         )  # fmt: skip
         write(folder, found)
     if not options.json and not options.quiet:
-        warn(cautions(found))
-    code = closing(options, failures=found.solution.failures, **summary(found))
+        common.warn(cautions(found))
+    code = common.closing(options, failures=found.solution.failures, **summary(found))
     return code if found.solution.converged else 1
 
 
@@ -100,14 +92,13 @@ def _inspect(options: argparse.Namespace) -> int:
     if options.scene or options.measured or options.vary:
         raise ValueError("--inspect only reads a file; remove SCENE, --measured and --vary")
     found = inspect(_read_measurement(options.inspect, options), alarm=options.false_alarm)
-    contents, lines = summary(found), text(found)
+    contents, lines = summary(found), [text(found)]
     if options.out:
-        with result_folder(options, "", [options.inspect]) as (folder, _):
+        with common.result_folder(options, "") as (folder, _):
             write(folder, found)
         contents["out"] = str(options.out)
-        lines += f"\nopen {options.out}/index.html"
-    summarise(options, contents, lines)
-    return 0
+        lines.append(f"open {options.out}/index.html")
+    return common.summarise(options, contents, lines)
 
 
 def _read_measurement(file: Path, options: argparse.Namespace) -> "Measurement":

@@ -10,11 +10,6 @@ from meshes import cache
 from skinwave.report.renderer import renderer
 from skinwave.system.effort import THREADS, usable_cores, versions
 
-DRAWING = ("matplotlib", "pyvista", "vtk", "pillow")
-OPTIONAL = (  # module, distribution, what it adds and how to install it
-    ("mkl", "mkl", "fastest solver on x86-64: pip install mkl"),
-    ("imageio_ffmpeg", "imageio-ffmpeg", "MP4 films: pip install imageio imageio-ffmpeg"),
-)
 MISSING = "not installed"
 
 
@@ -26,7 +21,7 @@ def examine() -> list[dict[str, str]]:
     limits = ", ".join(f"{name}={os.environ[name]}" for name in THREADS if name in os.environ)
     found = [
         *versions().items(),
-        *((name, _version(name)) for name in DRAWING),
+        *((name, _version(name)) for name in ("matplotlib", "pyvista", "vtk", "pillow")),
         ("machine", f"{platform.system()} {platform.machine()}"),
         ("solver", f"{solvers[0]} (of {', '.join(solvers)})"),
         (
@@ -37,7 +32,11 @@ def examine() -> list[dict[str, str]]:
         ("threads", f"{usable_cores()} processors" + (f", limited by {limits}" if limits else "")),
         ("cache", str(home) if home else "off, by SKINWAVE_CACHE"),
     ]
-    for module, name, cure in OPTIONAL:
+    optional = (  # module, distribution, what it adds and how to install it
+        ("mkl", "mkl", "fastest solver on x86-64: pip install mkl"),
+        ("imageio_ffmpeg", "imageio-ffmpeg", "MP4 films: pip install imageio imageio-ffmpeg"),
+    )
+    for module, name, cure in optional:
         installed = _version(name)  # MKL is a library without a module
         is_missing = installed == MISSING and find_spec(module) is None
         found.append((name, installed, cure if is_missing else ""))

@@ -15,12 +15,11 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from skinwave.commands.common import summarise, warn
+from skinwave.commands.common import paths_of, summarise, warn
 from skinwave.system.extensions import VARIABLE
 from skinwave.system.plain_text import say
 
 COMMANDS = ("run", "compare", "relax", "report")
-LARGEST = 200_000_000  # bytes of a kept result
 
 
 def run_or_recall(options: argparse.Namespace) -> int:
@@ -77,8 +76,8 @@ def _sources() -> list[Path]:
     return sorted(path for path in found if path.is_file() and path.suffix != ".pyc")
 
 
-def _keep(name: str, options: argparse.Namespace) -> None:
-    """Keep the folder and the summary of a command."""
+def _keep(name: str, options: argparse.Namespace, most_bytes: int = 200_000_000) -> None:
+    """Keep the folder and the summary of a command, unless the folder is too large."""
     import numpy as np
 
     from meshes import cache
@@ -88,7 +87,7 @@ def _keep(name: str, options: argparse.Namespace) -> None:
     if is_incomplete or not hasattr(options, "summary") or not options.out.is_dir():
         return
     files = {path: path.read_bytes() for path in options.out.rglob("*") if path.is_file()}
-    if sum(map(len, files.values())) > LARGEST:
+    if sum(map(len, files.values())) > most_bytes:
         return
     summary, text = options.summary
     meta = {
@@ -108,8 +107,7 @@ def _recall(options: argparse.Namespace, meta: dict[str, Any], files: dict[str, 
     from skinwave.results.outputs import output_folder
 
     options.out = options.out or Path(meta["default"])
-    given = [value for value in vars(options).values() if isinstance(value, Path)]
-    inputs = [path for path in given if path != options.out]
+    inputs = paths_of(options)
     with output_folder(options.out, overwrite=options.overwrite, inputs=inputs) as folder:
         for name, content in files.items():
             path = folder / name
@@ -127,5 +125,4 @@ def _recall(options: argparse.Namespace, meta: dict[str, Any], files: dict[str, 
         say(f"skinwave: nothing has changed since {meta['written']}: the same result, from the "
             "cache; --no-cache computes it again", sys.stderr)  # fmt: skip
     summary = meta["summary"] | {"out": str(options.out), "from_cache": meta["written"]}
-    summarise(options, summary, meta["text"].replace(meta["out"], str(options.out)))
-    return 0
+    return summarise(options, summary, [meta["text"].replace(meta["out"], str(options.out))])

@@ -3,26 +3,18 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import (
-    add_output,
-    add_scenes,
-    progress_of,
-    summarise,
-    with_failures,
-)
-
-OUT = Path("live.html")
+from skinwave.commands import common
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    add_scenes(parser, "skin-slab, paper-sheet and palm")
+    common.add_scenes(parser, "skin-slab, paper-sheet and palm")
     parser.add_argument(
         "--no-selftest", dest="tests", action="store_const", const=0, default=60,
         help="leave out the data of live.html#selftest",
     )  # fmt: skip
-    add_output(parser, "FILE", f"file to write (default: {OUT})")
-    parser.set_defaults(out=OUT)
+    common.add_output(parser, "FILE", "file to write (default: live.html)")
+    parser.set_defaults(out=Path("live.html"))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -34,13 +26,11 @@ def run(options: argparse.Namespace) -> int:
     inputs = [*options.scenes, *(file for scene in scenes for file in scene.files)]
     with (
         output_file(options.out, overwrite=options.overwrite, inputs=inputs) as file,
-        progress_of(options) as progress,
+        common.progress_of(options) as progress,
     ):
         data = data_of(scenes, progress, tests=options.tests)
         size = file.write(page(data).encode())
     bodies = [record["title"] for record in data["bodies"]]
     summary = {"out": str(options.out), "bytes": size, "bodies": bodies}
     wrote = f"wrote {options.out} ({size / 1e6:.1f} MB): {', '.join(bodies)}"
-    summary["failures"] = data["failures"]
-    summarise(options, summary, "\n".join(with_failures(data["failures"], [wrote])))
-    return 1 if data["failures"] else 0
+    return common.summarise(options, summary, [wrote], data["failures"])

@@ -75,5 +75,4 @@ def run(options: argparse.Namespace) -> int:
         "said": notes,
     }  # fmt: skip
     sets = ", ".join(f"{name} {count:,}" for name, count in facets.items())
-    summarise(options, summary, "\n".join([*notes, f"facets: {sets}", f"wrote {out}"]))
-    return 0
+    return summarise(options, summary, [*notes, f"facets: {sets}", f"wrote {out}"])

@@ -2,23 +2,15 @@
 
 import argparse
 
-from skinwave.commands.common import (
-    add_mesh,
-    add_model,
-    add_reporting,
-    add_scene,
-    plan_of_command,
-    progress_of,
-    summarise,
-)
+from skinwave.commands import common
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    add_scene(parser)
-    add_model(parser)
-    add_mesh(parser)
-    add_reporting(parser)
+    common.add_scene(parser)
+    common.add_model(parser)
+    common.add_mesh(parser)
+    common.add_reporting(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -30,12 +22,11 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.system.progress_bar import announce
 
     scene = read(options.scene)
-    with progress_of(options) as progress:
-        found = plan_of_command(options, scene, progress=progress)
+    with common.progress_of(options) as progress:
+        found = common.plan_of_command(options, scene, progress=progress)
         announce(progress, "uncertainty")
         row = mesh_row(replace(scene, body=found.body), found.h, found.error)
     found = replace(found, rows=(*found.rows, row))
     width = [max(len(getattr(row, name)) for row in found.rows) for name in ("what", "value")]
     lines = (f"{r.what:<{width[0]}}  {r.value:<{width[1]}}  {r.reason}" for r in found.rows)
-    summarise(options, found.table(), "\n".join(lines))
-    return 0
+    return common.summarise(options, found.table(), lines)

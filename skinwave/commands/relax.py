@@ -42,8 +42,8 @@ def run(options: argparse.Namespace) -> int:
     if options.scene == BOTH:
         return _paper_vs_skin(options)
     scene = read(options.scene)
-    name, inputs = f"{Path(options.scene).stem}-relaxed", [options.scene, *scene.files]
-    with result_folder(options, name, inputs, scene) as (folder, progress):
+    name = f"{Path(options.scene).stem}-relaxed"
+    with result_folder(options, name, scene, [options.scene]) as (folder, progress):
         found = hierarchy_of(scene, progress, h=h, update_rate=rate, points=options.points)
         write(folder, found)
     warnings = document.worst_warnings(found.efforts)

@@ -5,30 +5,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skinwave.commands.common import (
-    add_mesh,
-    add_output,
-    add_width,
-    closing,
-    progress_of,
-    result_folder,
-    solving,
-    summarise,
-    warn,
-    with_failures,
-)
+from skinwave.commands import common
 
 if TYPE_CHECKING:
     from skinwave.results.views import View
     from skinwave.scene.scene import Scene
     from skinwave.system.effort import Progress
 
-STYLES, FORMATS = ("report", "talk", "print"), ("svg", "pdf")
 ONLY_WITH = {  # an option -> what it applies to
     "camera": ("film",), "frames": ("film",), "reach": ("map",), "step": ("map",),
     "depth": ("map",), "quantity": ("film", "map"),
 }  # fmt: skip
-REACH, STEP = 30.0, 1.0  # mm, of a map
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -47,16 +34,19 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--map", action="store_true",
         help="write only a map: RMS of the quantity of the probes over the body, at their depth",
     )  # fmt: skip
-    add("--style", choices=STYLES, default="report", help="style of figures (default: report)")
     add(
-        "--format", choices=FORMATS, action="append", default=[],
+        "--style", choices=("report", "talk", "print"), default="report",
+        help="style of figures (default: report)",
+    )  # fmt: skip
+    add(
+        "--format", choices=("svg", "pdf"), action="append", default=[],
         help="format of figures besides PNG; may be repeated",
     )  # fmt: skip
     add(
         "--beside", type=lambda text: text.split(","), default=[], metavar="BODIES",
         help="add these bodies: paper-sheet, skin-slab or palm, separated by commas",
     )  # fmt: skip
-    add_width(parser)
+    common.add_width(parser)
     add(
         "--only", type=lambda text: text.split(","), default=[], metavar="COLUMNS",
         help="show only these models, such as point-kernel,skin-slab",
@@ -67,14 +57,14 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--frames", type=int, metavar="N",
         help="frames of a film (default: as many as its fastest strong line needs)",
     )  # fmt: skip
-    add("--reach", type=float, metavar="MM", help=f"half width of a map (default: {REACH:g} mm)")
-    add("--step", type=float, metavar="MM", help=f"grid step of a map (default: {STEP:g} mm)")
+    add("--reach", type=float, metavar="MM", help="half width of a map (default: 30 mm)")
+    add("--step", type=float, metavar="MM", help="grid step of a map (default: 1 mm)")
     add(
         "--depth", metavar="MM",
         help="depth of a map in mm, or a receptor (default: that of the scene)",
     )  # fmt: skip
-    add_mesh(parser)
-    add_output(parser)
+    common.add_mesh(parser)
+    common.add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -102,20 +92,19 @@ def _page(options: argparse.Namespace) -> int:
         options.out, options.overwrite = source / "report", True
         if options.out.is_symlink():
             raise ValueError(f"{options.out} is a link; remove it, or name a folder with --out")
-    inputs = [source, *(scene.files if scene else ())]
     failures: dict[str, str] = {}
-    with result_folder(options, f"{source.stem}-report", inputs, scene) as (folder, progress):
+    with common.result_folder(options, f"{source.stem}-report", scene) as (folder, progress):
         if scene is not None:
             warnings, failures = write_album(
-                folder, scene, solving(options, progress), beside=options.beside
+                folder, scene, common.solving(options, progress), beside=options.beside
             )
-            warn(warnings)
+            common.warn(warnings)
         failures = write_report(
             folder if scene else source, folder, chosen, progress, formats=options.format,
             columns=options.only, command=command["typed"] if scene else "", failures=failures,
         )  # fmt: skip
         size = (folder / "index.html").stat().st_size / 1e6
-    return closing(options, [f"page of {size:.1f} MB"], failures, megabytes=round(size, 2))
+    return common.closing(options, [f"page of {size:.1f} MB"], failures, megabytes=round(size, 2))
 
 
 def _map(options: argparse.Namespace) -> int:
@@ -128,15 +117,13 @@ def _map(options: argparse.Namespace) -> int:
     scene = _scene(options)
     depth = scene.depths[0] if options.depth is None else depth_of(options.depth)
     scene = replace(scene, depth=depth)
-    reach = REACH if options.reach is None else options.reach
-    step = STEP if options.step is None else options.step
-    name, inputs = f"{options.source.stem}-map", [options.source, *scene.files]
-    with result_folder(options, name, inputs, scene) as (folder, progress):
-        given = solving(options, progress)
+    reach = 30.0 if options.reach is None else options.reach  # mm
+    step = 1.0 if options.step is None else options.step
+    with common.result_folder(options, f"{options.source.stem}-map", scene) as (folder, progress):
+        given = common.solving(options, progress)
         found = quantity_map(scene, given, reach=reach / 1e3, step=step / 1e3)
         write_map(folder, scene, found)
-    closing(options, map_sentences(scene, found))
-    return 0
+    return common.closing(options, map_sentences(scene, found))
 
 
 def _film(options: argparse.Namespace) -> int:
@@ -151,17 +138,15 @@ def _film(options: argparse.Namespace) -> int:
         raise ValueError(f"--frames is {options.frames}; give a number from 2 to 1000")
     with (
         output_path(out, overwrite=options.overwrite, inputs=[source]) as aside,
-        progress_of(options) as progress,
+        common.progress_of(options) as progress,
     ):
         views, failures = _views(options, progress)
         camera = options.camera or "tilted"
         film(aside, views, style(options.style), progress, camera=camera)
     frames = len(views[0].times)
-    summary = {"out": str(out), "frames": frames, "period_ms": 1e3 * views[0].period,
-               "failures": failures}  # fmt: skip
+    summary = {"out": str(out), "frames": frames, "period_ms": 1e3 * views[0].period}
     text = f"{frames} frames of {played_text(views[0])}; wrote {out}"
-    summarise(options, summary, "\n".join(with_failures(failures, [text])))
-    return 1 if failures else 0
+    return common.summarise(options, summary, [text], failures)
 
 
 def _scene(options: argparse.Namespace) -> "Scene":
@@ -183,9 +168,9 @@ def _views(
     if not options.source.is_dir():
         views, warnings, failures = quantity_views(
             replace(_scene(options), depth=0.0),  # a film shows the surface
-            solving(options, progress), frames=options.frames, beside=options.beside,
+            common.solving(options, progress), frames=options.frames, beside=options.beside,
         )  # fmt: skip
-        warn(warnings)
+        common.warn(warnings)
         return views, failures
     if options.quantity is not None:
         raise ValueError(

@@ -4,20 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skinwave.commands.common import (
-    accuracy,
-    add_mesh,
-    add_model,
-    add_output,
-    add_scene,
-    metre,
-    plan_of_command,
-    result_folder,
-    solving,
-    summarise,
-    warn,
-    with_failures,
-)
+from skinwave.commands import common
 
 if TYPE_CHECKING:
     from skinwave.results.run import Run
@@ -27,15 +14,15 @@ if TYPE_CHECKING:
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    add_scene(parser)
-    add_model(parser)
-    add_mesh(parser)
+    common.add_scene(parser)
+    common.add_model(parser)
+    common.add_mesh(parser)
     parser.add_argument(
         "--samples", type=int, metavar="N",
         help="sample the uncertain numbers of the scene N times, for bands and percentiles",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="seed of the samples (default: 0)")
-    add_output(parser)
+    common.add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -54,16 +41,16 @@ def run(options: argparse.Namespace) -> int:
     scene = read(options.scene)
     if options.samples is not None:
         check(spreads_of(scene), options.samples, options.seed)
-    inputs = [options.scene, *scene.files]
     with (
-        result_folder(options, f"{options.scene.stem}-out", inputs) as (folder, progress),
+        common.result_folder(options, f"{options.scene.stem}-out", scene) as (folder, progress),
         pool(1) as workers,
     ):
-        moved = begin_surface(scene, solving(options, progress, model=options.model), workers)
+        solving = common.solving(options, progress, model=options.model)
+        moved = begin_surface(scene, solving, workers)
         gallery = begin_gallery(scene, moved, workers) if moved else Gallery(workers=workers)
-        plan = plan_of_command(options, scene, progress=progress)
+        plan = common.plan_of_command(options, scene, progress=progress)
         response = solve_as_planned(scene, plan)
-        warn(w for w in response.effort.warnings if w not in plan.warnings)
+        common.warn(w for w in response.effort.warnings if w not in plan.warnings)
         run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
         more: list[Part] = []
         if options.samples:
@@ -75,23 +62,13 @@ def run(options: argparse.Namespace) -> int:
         record.write(folder, command, scene=scene, response=response)
     effort = response.effort
     summary = {
-        "out": str(options.out), "failures": failures, "model": response.model, "dofs": effort.dofs,
+        "out": str(options.out), "model": response.model, "dofs": effort.dofs,
         "solver": effort.solver, "seconds": round(sum(effort.seconds.values()), 2),
+        **effort.errors.summary(), "warnings": list(effort.warnings),
     }  # fmt: skip
-    summarise(
-        options,
-        summary | accuracy(response),
-        " ".join(
-            with_failures(
-                failures,
-                [
-                    f"{response.model}: wrote {options.out}/index.html; expected error "
-                    f"{effort.errors.words}"
-                ],
-            )
-        ),
-    )
-    return 1 if failures else 0
+    wrote = f"{response.model}: wrote {options.out}/index.html"
+    line = f"{wrote}; expected error {effort.errors.words}"
+    return common.summarise(options, summary, [line], failures)
 
 
 def _uncertainty(
@@ -103,5 +80,6 @@ def _uncertainty(
 
     return write_ensemble(
         folder, run.scene, options.samples, model=run.model, progress=progress,
-        h=h or metre(options.h), solver=options.solver, seed=options.seed, workers=usable_cores(),
+        h=h or common.metre(options.h), solver=options.solver, seed=options.seed,
+        workers=usable_cores(),
     )  # fmt: skip

@@ -9,22 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from skinwave.commands.common import (
-    add_mesh,
-    add_model,
-    add_reporting,
-    add_width,
-    metre,
-    progress_of,
-    summarise,
-    with_failures,
-)
+from skinwave.commands import common
 from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-FORMATS = ("png", "svg", "pdf")
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -61,8 +50,8 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--workers", type=int, metavar="N",
         help="number of runs at a time on this machine (default: all cores)",
     )  # fmt: skip
-    add_model(parser, has_steps=False)
-    add_mesh(parser)
+    common.add_model(parser, has_steps=False)
+    common.add_mesh(parser)
     add("--csv", action="store_true", help="also write rows.csv")
     add(
         "--all-columns", action="store_true",
@@ -80,10 +69,13 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--x", metavar="KEY", help="key of the horizontal axis (default: the one with most values)")
     add("--by", metavar="KEY", help="key with a curve for each value (default: the next one)")
     add("--heat", action="store_true", help="draw a map over --x and --by")
-    add("--format", choices=FORMATS, default="png", help="format of figures (default: png)")
+    add(
+        "--format", choices=("png", "svg", "pdf"), default="png",
+        help="format of figures (default: png)",
+    )  # fmt: skip
     add("--style", default="report", help="report (default), talk or print")
-    add_width(parser)
-    add_reporting(parser)
+    common.add_width(parser)
+    common.add_reporting(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -111,9 +103,8 @@ def run(options: argparse.Namespace) -> int:
         if options.plot is not None:
             summary["figures"] = _draw(options, out, figures)
             lines += [f"wrote {path}" for path in summary["figures"]]
-    summary["failures"] = failures
-    summarise(options, summary, "\n".join(with_failures(failures, lines)))
-    return 1 if missing or failures else 0
+    code = common.summarise(options, summary, lines, failures)
+    return 1 if missing else code
 
 
 def _sweep(
@@ -144,12 +135,13 @@ def _sweep(
     tables = uncertainty_page.SAMPLED_FILES if has_page else ()
     dataset.check_own_files(out, [*tables, *[dataset.CSV] * options.csv])  # before any run
     solving = SolveOptions(
-        model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
-    )
+        model=options.model, tolerance=options.tolerance, h=common.metre(options.h),
+        solver=options.solver,
+    )  # fmt: skip
     points = cases(options.scene, combined)
     optimum, files, failures = tuple[best.Best, ...](), list[str](), dict[str, str]()
     figures = dict[str, Any]()
-    with progress_of(options) as progress:
+    with common.progress_of(options) as progress:
         sweep = Sweep(
             folder=out, points=partial(cases, options.scene), options=solving, progress=progress,
             scheduler=options.scheduler, workers=options.workers,

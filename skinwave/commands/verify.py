@@ -5,8 +5,6 @@ from pathlib import Path
 
 from skinwave.commands.common import add_output, closing, result_folder, summarise
 
-HAND = Path("examples/hand/generic-hand-right.glb")
-
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
@@ -28,7 +26,8 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--hand", type=Path, metavar="FILE",
         help="with --published: also compute the decay along a finger of this hand by finite "
-        f"elements, in minutes; the palm faces -x, as in {HAND} of the repository",
+        "elements, in minutes; the palm faces -x, as in examples/hand/generic-hand-right.glb of "
+        "the repository",
     )  # fmt: skip
     add_output(parser)
 
@@ -65,12 +64,10 @@ def _cases(options: argparse.Namespace) -> int:
 def _run_published(options: argparse.Namespace) -> int:
     from skinwave.verify.validation import report, validate, verdict
 
-    inputs = [options.hand] if options.hand else []
-    with result_folder(options, "validation", inputs) as (folder, progress):
+    with result_folder(options, "validation") as (folder, progress):
         curves, rows = validate(progress, hand=options.hand)
         report(curves, rows).write(folder)
-    closing(options, verdict(rows))
-    return 0
+    return closing(options, verdict(rows))
 
 
 def _tradeoff(options: argparse.Namespace) -> int:
@@ -78,8 +75,7 @@ def _tradeoff(options: argparse.Namespace) -> int:
     from skinwave.studies.tradeoff import sentences, tradeoff, write
 
     scene, name = read(options.scene), f"{options.scene.stem}-tradeoff"
-    inputs = [options.scene, *scene.files]
-    with result_folder(options, name, inputs, scene) as (folder, progress):
+    with result_folder(options, name, scene) as (folder, progress):
         found = tradeoff(scene, progress)
         write(folder, scene, found)
     return closing(options, sentences(found), found.failures, accepted=found.is_converged)
@@ -89,5 +85,4 @@ def _installation(options: argparse.Namespace) -> int:
     from skinwave.commands.installation import examine, text
 
     found = examine()
-    summarise(options, {"findings": found}, text(found))
-    return 0
+    return summarise(options, {"findings": found}, [text(found)])

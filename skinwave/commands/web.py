@@ -10,7 +10,6 @@ from pathlib import Path
 from skinwave.commands.common import add_reporting, add_scenes, progress_of, warn, with_failures
 from skinwave.system.plain_text import say
 
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 QUICK = ("skin-slab", "paper-sheet")  # bodies that are ready in seconds
 
 
@@ -42,7 +41,8 @@ def run(options: argparse.Namespace) -> int:
         warn(with_failures(data["failures"], []))
         server.show(data)
         say(f"skinwave: {server.address} (press Ctrl-C to stop)", sys.stderr)
-        has_display = sys.platform in ("win32", "darwin") or any(map(os.environ.get, DISPLAYS))
+        displays = map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))
+        has_display = sys.platform in ("win32", "darwin") or any(displays)
         if base != "/":
             say(f"skinwave: behind the proxy, open {base}?token={server.token}", sys.stderr)
         elif has_display and not options.no_browser:
