@@ -124,7 +124,8 @@ def plan_of_command(options: argparse.Namespace, scene: "Scene", **more: Any) ->
 
 def paths_of(options: argparse.Namespace) -> list[Path]:
     """Return the files and folders that options name, without the result."""
-    return [x for key, x in vars(options).items() if isinstance(x, Path) and key not in ("out", "default_out")]
+    given = {key: x for key, x in vars(options).items() if key not in ("out", "default_out")}
+    return [x for x in given.values() if isinstance(x, Path)]
 
 
 def warn(sentences: Iterable[str]) -> None:
