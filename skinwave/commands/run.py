@@ -47,7 +47,9 @@ def run(options: argparse.Namespace) -> int:
     ):
         solving = common.solving(options, progress, model=options.model)
         moved = begin_surface(scene, solving, workers)
-        gallery = begin_gallery(scene, moved, workers) if moved else Gallery(workers=workers)
+        gallery = Gallery(workers=workers, progress=progress)
+        if moved:
+            gallery = begin_gallery(scene, moved, workers, progress)
         plan = common.plan_of_command(options, scene, progress=progress)
         response = solve_as_planned(scene, plan)
         common.warn(w for w in response.effort.warnings if w not in plan.warnings)
@@ -56,9 +58,7 @@ def run(options: argparse.Namespace) -> int:
         if options.samples:
             more = _uncertainty(options, run, plan.h, folder, progress)
         command = record.command_entry(options)
-        failures = write_run_page(
-            folder, run, more, command["typed"], moved=moved, gallery=gallery, progress=progress,
-        )  # fmt: skip
+        write_run_page(folder, run, gallery, more=more, command=command["typed"], moved=moved)
         record.write(folder, command, scene=scene, response=response)
     effort = response.effort
     summary = {
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
     }  # fmt: skip
     wrote = f"{response.model}: wrote {options.out}/index.html"
     line = f"{wrote}; expected error {effort.errors.words}"
-    return common.summarise(options, summary, [line], failures)
+    return common.summarise(options, summary, [line], gallery.failures)
 
 
 def _uncertainty(

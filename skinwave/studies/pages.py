@@ -8,7 +8,7 @@ import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import starmap
 from pathlib import Path
@@ -61,12 +61,15 @@ MARKS = "Black: path and focus; yellow: probes."
 class Gallery:
     """How pictures are drawn: style, formats of figure files beside PNG, and processes that draw.
 
+    `failures` are the reasons of parts of the page that failed; drawing functions add theirs.
     `at_rest` and `side_by_side` are the pixels of pictures that `begin_gallery` has begun.
     """
 
     style: Style = REPORT
     formats: Sequence[str] = ()
     workers: Executor | None = None
+    progress: Progress = silent
+    failures: dict[str, str] = field(default_factory=dict)
     at_rest: "Future[Any] | None" = None
     side_by_side: "Future[Any] | None" = None
 
@@ -106,8 +109,6 @@ def page_of(
     command: str = "",
     notes: Sequence[Part] = (),
     seconds: float | None = None,
-    progress: Progress = silent,
-    failures: dict[str, str] | None = None,
 ) -> Report:
     """Return the page of runs by Tacton.
 
@@ -119,19 +120,17 @@ def page_of(
     modelled : further parts of what was modelled
     command, notes : command that makes the page again, and notes on it
     seconds : duration of all runs, by default the sum of their efforts
-    failures : reasons of parts that failed; the page adds its own
     """
     runs = [run for group in groups.values() for run in group]
-    failures = {} if failures is None else failures
     is_single = len(groups) == 1
     at_rest = _begin_pictures(runs, gallery) if is_single else {}
     drawn = _drawn(figures or groups, gallery)
-    progress("draw maps", 0.0)
+    gallery.progress("draw maps", 0.0)
     own = _first_parts(first, gallery) if first else []
-    progress("draw maps", 0.5)
-    spatial = _spatial_parts(first, gallery, failures) if first else []
-    body = [*before, *_body_parts(at_rest, gallery, failures)]
-    body += [*_waveforms(drawn, len(groups), progress), *after]
+    gallery.progress("draw maps", 0.5)
+    spatial = _spatial_parts(first, gallery) if first else []
+    body = [*before, *_body_parts(at_rest, gallery)]
+    body += [_waveforms(drawn, len(groups), gallery.progress), *after]
     body += tables.claims_parts(evaluate(assessable_runs(runs)))
     effects = first.effects if first else effects_of(groups, lambda run: ())
     if effects:
@@ -169,7 +168,7 @@ def page_of(
             numbers = gallery.figure("numbers", dots, about_numbers)
             detail = Section(f"One of them: {first.kernel.tacton}", own)
             parts = [overview.table(effects), numbers, parts[0], *spatial, detail, *parts[1:]]
-    return Report(title, [" ".join(verdict)], parts, efforts_of(runs), "pictures", failures)
+    return Report(title, [" ".join(verdict)], parts, efforts_of(runs), "pictures", gallery.failures)
 
 
 def _begin_pictures(runs: Sequence[Run], gallery: Gallery) -> "dict[Run, Callable[[], Any]]":
@@ -183,7 +182,9 @@ def _begin_pictures(runs: Sequence[Run], gallery: Gallery) -> "dict[Run, Callabl
     return {run: partial(_body_picture, run.scene, gallery.style) for run in meshed}
 
 
-def begin_gallery(scene: Scene, moved: "Future[Found]", workers: Executor) -> Gallery:
+def begin_gallery(
+    scene: Scene, moved: "Future[Found]", workers: Executor, progress: Progress
+) -> Gallery:
     """Begin to draw a body at rest and, once its surface has moved, the views of a scene, in a
     process beside other work. Their pixels are None without a renderer or views.
     """
@@ -201,8 +202,9 @@ def begin_gallery(scene: Scene, moved: "Future[Found]", workers: Executor) -> Ga
         return workers.submit(render.picture, views, REPORT, views[-1].peak_frame).result()
 
     gallery = Gallery(
-        workers=workers, at_rest=threads.submit(at_rest), side_by_side=threads.submit(side_by_side)
-    )
+        workers=workers, progress=progress, at_rest=threads.submit(at_rest),
+        side_by_side=threads.submit(side_by_side),
+    )  # fmt: skip
     threads.shutdown(wait=False)
     return gallery
 
@@ -214,9 +216,7 @@ def _body_picture(scene: Scene, style: Style) -> Any:
     return body_picture(scene, style)
 
 
-def _body_parts(
-    at_rest: "Mapping[Run, Callable[[], Any]]", gallery: Gallery, failures: dict[str, str]
-) -> list[Part]:
+def _body_parts(at_rest: "Mapping[Run, Callable[[], Any]]", gallery: Gallery) -> list[Part]:
     """Return the pictures of bodies, or the reason why there are none."""
     if at_rest and not renderer().is_available:
         return [Section("The body", [f"Its picture is left out: {renderer().detail}."])]
@@ -229,7 +229,7 @@ def _body_parts(
     for run, drawn in at_rest.items():
         from skinwave.report.body_picture import drawn_size  # slow to import
 
-        with or_failed(failures, f"picture of {run.column} at rest"):
+        with or_failed(gallery.failures, f"picture of {run.column} at rest"):
             size = significant(1e3 * drawn_size(run.scene.body), 2)
             caption = f"{label(run.column)} {body_caption} Elements in this picture: {size} mm."
             name = "body" if len(at_rest) == 1 else f"body-{run.column}"
@@ -245,31 +245,28 @@ def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
 
 
 def write_run_page(
-    folder: Path, run: Run, more: Sequence[Part] = (), command: str = "", *,
-    gallery: Gallery, moved: "Future[Found] | None" = None, progress: Progress = silent,
-) -> dict[str, str]:  # fmt: skip
-    """Write the folder of one run with its page, and return the reasons of parts that failed.
+    folder: Path, run: Run, gallery: Gallery, *, more: Sequence[Part] = (), command: str = "",
+    moved: "Future[Found] | None" = None,
+) -> None:  # fmt: skip
+    """Write the folder of one run with its page.
 
     `more` are further parts of the page, `moved` is the surface from `begin_surface`.
     """
     fill(folder, run)
-    first, failures = None, dict[str, str]()
+    first = None
     if run.is_motion and run.scene.load.is_plain:
         group = with_kernels(run)
         scenes = {each.column: each.scene for each in group}
-        progress(f"map of {run.column}", 0.0)
+        gallery.progress(f"map of {run.column}", 0.0)
         found: Surfaces = {}
-        with or_failed(failures, f"map of {run.column}"):
+        with or_failed(gallery.failures, f"map of {run.column}"):
             found, failed = moved.result() if moved else quick_surface(run, None)
-            failures |= failed
+            gallery.failures.update(failed)
         surface = found.get((run.tacton, run.column), Surface())
         first = first_screen({run.tacton: group}, lambda _: surface.maps, views_of(scenes, found))
     title = f"{run.tacton} on {label(run.body)}: {run.model}"
-    page_of(
-        title, {run.tacton: [run]}, first, gallery, after=more, command=command, progress=progress,
-        failures=failures,
-    ).write(folder)  # fmt: skip
-    return failures
+    page = page_of(title, {run.tacton: [run]}, first, gallery, after=more, command=command)
+    page.write(folder)
 
 
 def _efforts_by_body(runs: Sequence[Run]) -> dict[str, Effort]:
@@ -324,13 +321,13 @@ def _tacton_pictures(
     return pictures
 
 
-def _waveforms(drawn: Iterator[dict[str, Picture]], count: int, progress: Progress) -> list[Part]:
+def _waveforms(drawn: Iterator[dict[str, Picture]], count: int, progress: Progress) -> Part:
     """Return a choice between the figures of Tactons."""
     options: dict[str, Part] = {}
     for k, pictures in enumerate(drawn):
         progress(f"draw {next(iter(pictures))}", k / count)
         options |= pictures
-    return [Section("Waveforms", [Choice("waveforms", options)])]
+    return Section("Waveforms", [Choice("waveforms", options)])
 
 
 def _caption(name: str, runs: Sequence[Run]) -> str:
@@ -373,14 +370,14 @@ def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
     return [*parts, _uncertainty(first)]
 
 
-def _spatial_parts(first: FirstScreen, gallery: Gallery, failures: dict[str, str]) -> list[Part]:
+def _spatial_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
     """Return the picture of the views when the body moves most, if there are any views."""
     if not first.views:
         return []
     if not renderer().is_available:
         return [f"Three-dimensional pictures are left out: {renderer().detail}."]
     own = next((v for v in first.views if v.column == first.body.column), first.views[-1])
-    with or_failed(failures, "picture in three dimensions"):
+    with or_failed(gallery.failures, "picture in three dimensions"):
         drawn = gallery.side_by_side.result() if gallery.side_by_side else None
         return [side_by_side(first.views, own.peak_frame, gallery, drawn)]
     return []

@@ -59,22 +59,21 @@ def write_report(
     parts in `failures`. Returns the reasons of all parts that failed. Raises a ValueError if the
     folder has no result or no such column.
     """
-    failed = dict(failures or {})
     album = select_columns(open_album(results), columns)
     with pool(1) as workers:
-        gallery = Gallery(style=style, formats=formats, workers=workers)
-        page = _page(album, gallery, out, progress, failed, command or _command(results))
+        gallery = Gallery(
+            style=style, formats=formats, workers=workers, progress=progress,
+            failures=dict(failures or {}),
+        )  # fmt: skip
+        page = _page(album, gallery, out, command or _command(results))
     page.write(out)
-    return failed
+    return gallery.failures
 
 
-def _page(
-    album: Album, gallery: Gallery, out: Path, progress: Progress, failed: dict[str, str],
-    command: str,
-) -> Report:  # fmt: skip
+def _page(album: Album, gallery: Gallery, out: Path, command: str) -> Report:
     """Return the page, and write the data of its pictures."""
-    before = [*picture_parts(album, gallery, progress, failed), *map_parts(album, gallery)]
-    progress("write data", 0.0)
+    before = [*picture_parts(album, gallery), *map_parts(album, gallery)]
+    gallery.progress("write data", 0.0)
     _write_data(out / "data", album)
     groups: dict[str, Sequence[Run]] = {}
     for name, runs in album.groups.items():  # both point kernels are computed again
@@ -84,15 +83,13 @@ def _page(
     drawn_with = renderer().detail if renderer().is_available else "none"
     return page_of(
         album.title, album.groups, first_screen(groups, partial(_maps, album)), gallery,
-        before=before, after=[scene, *_wave_parts(album, gallery, failed)],
-        modelled=_plan_parts(album), progress=progress, failures=failed, command=command,
+        before=before, after=[scene, *_wave_parts(album, gallery)],
+        modelled=_plan_parts(album), command=command,
         notes=[f"Renderer of three-dimensional pictures: {drawn_with}."],
     )  # fmt: skip
 
 
-def picture_parts(
-    album: Album, gallery: Gallery, progress: Progress, failures: dict[str, str]
-) -> list[Part]:
+def picture_parts(album: Album, gallery: Gallery) -> list[Part]:
     """Return parts of a page that show the views, or say why there are none."""
     if not (views := list(album.views.values())):
         return [
@@ -111,9 +108,9 @@ def picture_parts(
             copies = replace(own), [replace(view) for view in views]
             draw_film = gallery.workers.submit(_film, *copies, gallery.style, silent).result
         else:
-            draw_film = partial(_film, own, views, gallery.style, progress)
-        options = _spatial_parts(own, views, gallery, progress, failures)
-    progress("draw snapshots", 0.0)
+            draw_film = partial(_film, own, views, gallery.style, gallery.progress)
+        options = _spatial_parts(own, views, gallery)
+    gallery.progress("draw snapshots", 0.0)
     figure = maps.snapshots_figure(views, gallery.style)
     snapshots = (
         "The surface when the body moves most, then at quarters of a turn of the focus, or of a "
@@ -122,10 +119,10 @@ def picture_parts(
         "wavelength, no clean cone forms."
     )
     options["snapshots"] = gallery.figure("snapshots", figure, snapshots)
-    progress("draw snapshots", 0.5)
+    gallery.progress("draw snapshots", 0.5)
     if draw_film:
-        progress("film", 0.0)
-        with or_failed(failures, "film"):
+        gallery.progress("film", 0.0)
+        with or_failed(gallery.failures, "film"):
             options["film"] = draw_film()
     turned_caption = (
         "Turn it with the mouse, a finger or the arrow keys. Colour: motion about its mean, red "
@@ -138,18 +135,16 @@ def picture_parts(
     return [Section("Pictures", [*missing, pictures, turned])]
 
 
-def _spatial_parts(
-    own: View, views: Sequence[View], gallery: Gallery, progress: Progress, failures: dict[str, str]
-) -> dict[str, Part]:
+def _spatial_parts(own: View, views: Sequence[View], gallery: Gallery) -> dict[str, Part]:
     """Return three-dimensional pictures by name, without those that fail."""
     parts: dict[str, Part] = {}
-    progress("draw side by side", 0.0)
-    with or_failed(failures, "picture side by side"):
+    gallery.progress("draw side by side", 0.0)
+    with or_failed(gallery.failures, "picture side by side"):
         parts["side by side"] = side_by_side(views, own.peak_frame, gallery)
     if not len(own.tets):
         return parts
-    with or_failed(failures, "picture cut open"):
-        progress("draw cut open", 0.0)
+    with or_failed(gallery.failures, "picture cut open"):
+        gallery.progress("draw cut open", 0.0)
         largest = np.abs(own.inward).max(axis=1)
         in_view = own.scene.tacton.trajectory.position(own.times)[:, 1] >= 0
         behind = int(np.where(in_view, largest, -1.0).argmax())
@@ -237,12 +232,12 @@ def _plan_parts(album: Album) -> list[Part]:
     return [*parts, *(f"Warning: {text}." for text in planned["warnings"])]
 
 
-def _wave_parts(album: Album, gallery: Gallery, failures: dict[str, str]) -> list[Part]:
+def _wave_parts(album: Album, gallery: Gallery) -> list[Part]:
     """Return dispersion curves of the scene's body, if it has any."""
     if album.scene.body.of_kind.dispersion is None:
         return []
     # Such as a table of moduli that does not cover the frequencies.
-    with or_failed(failures, "dispersion curves"):
+    with or_failed(gallery.failures, "dispersion curves"):
         parts = dispersion.page_parts(dispersion.driven_modes(album.scene), gallery)
         return [Details("Which waves the body guides, and which the load drives", parts)]
     return []

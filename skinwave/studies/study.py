@@ -162,11 +162,11 @@ def run_study(
         if interrupted:
             said = f"Interrupted: this page shows the {len(runs)} finished of {planned} runs."
             parts.insert(0, said)
-        gallery = Gallery(workers=None if interrupted else workers)
+        drawing = None if interrupted else workers
+        gallery = Gallery(workers=drawing, progress=progress, failures=failed)
         page_of(
-            title, groups, first, gallery, figures=figures, progress=progress,
-            before=parts, modelled=[about], seconds=time.perf_counter() - started,
-            command=command, failures=failed,
+            title, groups, first, gallery, figures=figures, before=parts, modelled=[about],
+            seconds=time.perf_counter() - started, command=command,
             notes=["For one run: skinwave run TACTON/BODY/scene.toml in this folder."],
         ).write(folder)  # fmt: skip
     return StudyOutcome(

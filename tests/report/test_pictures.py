@@ -292,7 +292,7 @@ def test_a_page_says_why_it_has_no_picture_of_the_body(monkeypatch):
     run = Run(tacton="", body="palm", scene=loads(""), response=response)
     monkeypatch.setattr(pages, "renderer", lambda: NO_GL)
     gallery = pages.Gallery()
-    (part,) = pages._body_parts({run: Mock()}, gallery, {})
+    (part,) = pages._body_parts({run: Mock()}, gallery)
     assert "apt install libegl1" in str(part)
     flat = replace(run, response=replace(response, model="flat-body"))
     assert pages._begin_pictures([flat], gallery) == {}
@@ -444,10 +444,10 @@ def test_a_film_that_fails_is_left_out_by_name(monkeypatch):
     monkeypatch.setattr(report, "turntable", lambda *given: "")
     monkeypatch.setattr(report, "renderer", lambda: SimpleNamespace(is_available=True))
     monkeypatch.setattr(report, "_film", Mock(side_effect=ArithmeticError("no frames")))
-    album, failures = SimpleNamespace(views={"palm": view}, scene=view.scene), {}
-    (section,) = report.picture_parts(album, pages.Gallery(), lambda *phase: None, failures)
+    album, gallery = SimpleNamespace(views={"palm": view}, scene=view.scene), pages.Gallery()
+    (section,) = report.picture_parts(album, gallery)
     assert list(section.parts[0].options) == ["side by side", "snapshots"]
-    assert failures == {"film": "no frames"}
+    assert gallery.failures == {"film": "no frames"}
 
 
 def test_a_crash_of_the_renderer_is_detected(monkeypatch):
