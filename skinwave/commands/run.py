@@ -1,15 +1,8 @@
 """Run one model on one scene."""
 
 import argparse
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from skinwave.commands import common
-
-if TYPE_CHECKING:
-    from skinwave.results.run import Run
-    from skinwave.system.document import Part
-    from skinwave.system.effort import Progress
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +29,8 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.studies.pages import Gallery, begin_gallery, write_run_page
     from skinwave.studies.surfaces import begin_surface
     from skinwave.sweeps.sampling import check
+    from skinwave.sweeps.uncertainty_page import write_ensemble
+    from skinwave.system.effort import usable_cores
     from skinwave.system.processes import pool
 
     scene = read(options.scene)
@@ -54,9 +49,11 @@ def run(options: argparse.Namespace) -> int:
         response = solve_as_planned(scene, plan)
         common.warn(w for w in response.effort.warnings if w not in plan.warnings)
         run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
-        more: list[Part] = []
-        if options.samples:
-            more = _uncertainty(options, run, plan.h, folder, progress)
+        more = [] if options.samples is None else write_ensemble(
+            folder, scene, options.samples, model=run.model, progress=progress,
+            h=plan.h or common.metre(options.h), solver=options.solver, seed=options.seed,
+            workers=usable_cores(),
+        )  # fmt: skip
         command = record.command_entry(options)
         write_run_page(folder, run, gallery, more=more, command=command["typed"], moved=moved)
         record.write(folder, command, scene=scene, response=response)
@@ -69,17 +66,3 @@ def run(options: argparse.Namespace) -> int:
     wrote = f"{response.model}: wrote {options.out}/index.html"
     line = f"{wrote}; expected error {effort.errors.words}"
     return common.summarise(options, summary, [line], gallery.failures)
-
-
-def _uncertainty(
-    options: argparse.Namespace, run: "Run", h: float | None, folder: Path, progress: "Progress"
-) -> "list[Part]":
-    """Write tables of samples into the folder, and return the parts of the page about them."""
-    from skinwave.sweeps.uncertainty_page import write_ensemble
-    from skinwave.system.effort import usable_cores
-
-    return write_ensemble(
-        folder, run.scene, options.samples, model=run.model, progress=progress,
-        h=h or common.metre(options.h), solver=options.solver, seed=options.seed,
-        workers=usable_cores(),
-    )  # fmt: skip

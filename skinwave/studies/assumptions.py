@@ -5,8 +5,8 @@ lobes. Its pressure follows the command and acts only where it is applied, on fl
 nothing propagates. Each name in `ASSUMPTIONS` drops one of these.
 
 One chain serves all bodies. Waves first propagate in an infinite flat body with the depth, base and
-regions under the focus. Its loss is dropped there, because elements of a body with little loss
-need several times as many moments as a reduction allows.
+regions under the focus. The assumption of little loss is dropped there, because elements of a body
+with little loss need several times as many moments as a reduction allows.
 """
 
 from collections.abc import Collection, Sequence
@@ -105,9 +105,9 @@ def side_step(scene: Scene) -> tuple[str, ...]:
 def can_be_alone(name: str, names: Collection[str], scene: Scene, h: float | None = None) -> bool:
     """Whether an assumption can be the only one that is made.
 
-    The profile cannot if side lobes are among the steps, because the array has a profile of its
-    own. Little loss can in a sheet or a slab on bone; reductions of other bodies have too few
-    moments for it. An infinite body of elements needs a constraint other than its sides.
+    The profile cannot if side lobes are among the steps, because the array has its own profile.
+    Little loss can in a sheet or a slab on bone; reductions of other bodies have too few moments.
+    An infinite body of elements needs a constraint other than its sides.
     """
     body = scene.body
     on_bone = body.of_kind.is_layer and body.base == "clamped" and body.depth < np.inf
@@ -140,10 +140,10 @@ def without(
     path: Trajectory | None = None,
     h: float | None = None,
 ) -> tuple[Scene, str]:
-    """Return a scene without the dropped assumptions, and the model that a plan takes for it: one
-    without reflections from the sides for an infinite body, one with them for any other.
+    """Return a scene without the dropped assumptions, and the name of a model for it.
 
-    `path` is that of the device, by default `device_path`, h in m is that of `element_size`.
+    The model of an infinite body has no reflections from the sides, that of any other has them.
+    `path` is that of the device, by default `device_path`; h in m is that of `element_size`.
     Assumptions on the load are the same with and without propagation.
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
@@ -183,10 +183,9 @@ def device_path(
             f"more on a path that is drawn {path.drawing_frequency:g} times per second"
         )
     phases = np.arange(count) / count
-    places = path.at_phase(phases)
-    closed = np.vstack([places, places[:1]])
+    places = path.at_phase(phases).tolist()
+    stops = tuple(map(tuple, [*places, places[0]]))
     times = tuple((period * np.append(phases, 1.0)).tolist())
-    stops = tuple(map(tuple, closed.tolist()))
     return Trajectory(shape="recorded", points=stops, times=times, hold=True)
 
 
@@ -221,8 +220,10 @@ def _body(scene: Scene, dropped: Collection[str], h: float | None) -> Body:
         return material if solid == own else solid
 
     layers = tuple(replace(layer, material=assumed(layer.material)) for layer in body.layers)
-    changes: dict[str, object] = {"material": assumed(body.material), "layers": layers}
-    changes["regions"] = tuple((name, assumed(material)) for name, material in body.regions)
+    regions = tuple((name, assumed(material)) for name, material in body.regions)
+    changes: dict[str, object] = {
+        "material": assumed(body.material), "layers": layers, "regions": regions,
+    }  # fmt: skip
     if body.of_kind.is_plate:
         open_air = "baffle" in dropped or not body.mounting.is_frame
         changes["air"] = "vacuum" in dropped and ("free" if open_air else "baffle")
@@ -239,29 +240,27 @@ def _body(scene: Scene, dropped: Collection[str], h: float | None) -> Body:
 def isotropic_sheet(body: Body) -> Body:
     """Return a sheet with stiffness and tension averaged over its directions."""
     tension = body.mounting.mean_tension
-    mean = replace(body.mounting, tension_x=tension, tension_y=tension)
+    mean = replace(body, mounting=replace(body.mounting, tension_x=tension, tension_y=tension))
     if body.solid.orthotropy is None:
-        return replace(body, mounting=mean)
-    return replace(body, mounting=mean, material=replace(body.solid, orthotropy=None))
+        return mean
+    return replace(mean, material=replace(body.solid, orthotropy=None))
 
 
 def merged_layer(layers: Sequence[Layer]) -> Layer:
     """Return one layer with the total thickness and the mean stiffness of several layers."""
     thickness = sum(layer.thickness for layer in layers)
+    shares = [layer.thickness / thickness for layer in layers]
     solids = [solid_of(layer.material).relaxing() for layer in layers]
-
-    def mean(name: str) -> float:
-        parts = zip(layers, solids, strict=True)
-        return sum(layer.thickness * getattr(solid, name) for layer, solid in parts) / thickness
-
-    names = ("density", "shear_modulus", "viscosity", "loss_factor")
     moduli: dict[float, float] = {}
-    for layer, solid in zip(layers, solids, strict=True):
+    for share, solid in zip(shares, solids, strict=True):
         for term in solid.prony:
             time = float(f"{term.time:.9g}")  # merges times that differ by round-off
-            moduli[time] = moduli.get(time, 0.0) + layer.thickness / thickness * term.modulus
+            moduli[time] = moduli.get(time, 0.0) + share * term.modulus
     prony = tuple(PronyTerm(modulus=modulus, time=time) for time, modulus in moduli.items())
-    means: dict[str, Any] = {name: mean(name) for name in names}
+    means: dict[str, Any] = {
+        name: float(np.dot(shares, [getattr(solid, name) for solid in solids]))
+        for name in ("density", "shear_modulus", "viscosity", "loss_factor")
+    }
     return Layer(
         thickness=thickness, material=Material(poisson=solids[0].poisson, prony=prony, **means)
     )
@@ -269,12 +268,11 @@ def merged_layer(layers: Sequence[Layer]) -> Layer:
 
 def with_little_loss(solid: Material, w: float) -> Material:
     """Return a material with a tenth of the damping and the same storage modulus at w in rad/s."""
-    if solid.law is not None or solid.loss_factor:
-        less = solid.scaled(loss=LITTLE_LOSS)
-        storage = [float(m.complex_modulus(w).real) for m in (solid, less)]
-        return less.scaled(modulus=storage[0] / storage[1])
-    stiffer = (1 - LITTLE_LOSS) * float(solid.relaxing_modulus(w).real)
     less = solid.scaled(loss=LITTLE_LOSS)
+    if solid.law is not None or solid.loss_factor:
+        own, other = (float(m.complex_modulus(w).real) for m in (solid, less))
+        return less.scaled(modulus=own / other)
+    stiffer = (1 - LITTLE_LOSS) * float(solid.relaxing_modulus(w).real)
     return replace(less, shear_modulus=solid.shear_modulus + stiffer)
 
 

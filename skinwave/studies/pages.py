@@ -39,14 +39,8 @@ from skinwave.results.views import View
 from skinwave.scene import paper15
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene, body_name
-from skinwave.studies import overview, tables
-from skinwave.studies.first_screen import (
-    FirstScreen,
-    effects_of,
-    first_name,
-    first_screen,
-    with_kernels,
-)
+from skinwave.studies import first_screen, overview, tables
+from skinwave.studies.first_screen import FirstScreen, effects_of, first_name, with_kernels
 from skinwave.studies.surfaces import Found, Surface, Surfaces, quick_surface, views_of
 from skinwave.system import document
 from skinwave.system.document import Choice, Details, Part, Picture, Report, Section
@@ -263,7 +257,8 @@ def write_run_page(
             found, failed = moved.result() if moved else quick_surface(run, None)
             gallery.failures.update(failed)
         surface = found.get((run.tacton, run.column), Surface())
-        first = first_screen({run.tacton: group}, lambda _: surface.maps, views_of(scenes, found))
+        views = views_of(scenes, found)
+        first = first_screen.first_screen({run.tacton: group}, lambda _: surface.maps, views)
     title = f"{run.tacton} on {label(run.body)}: {run.model}"
     page = page_of(title, {run.tacton: [run]}, first, gallery, after=more, command=command)
     page.write(folder)

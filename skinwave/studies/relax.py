@@ -36,17 +36,7 @@ from skinwave.results.files import write_responses
 from skinwave.results.propagation import Reach
 from skinwave.results.run import ASSESSED
 from skinwave.scene.scene import Body, Scene, check_motion
-from skinwave.studies.assumptions import (
-    ASSUMPTIONS,
-    DEVICE_RATES,
-    can_be_alone,
-    check_rate,
-    device_path,
-    droppable,
-    element_size,
-    side_step,
-    without,
-)
+from skinwave.studies import assumptions
 from skinwave.studies.outward import Outward, outward
 from skinwave.system.document import Details, Part, Picture, Report, warnings_banner
 from skinwave.system.effort import Progress, peak_memory
@@ -150,7 +140,7 @@ def hierarchy_of(
     progress: Progress,
     *,
     h: float | None = None,
-    update_rate: float = DEVICE_RATES[0],
+    update_rate: float = assumptions.DEVICE_RATES[0],
     points: int | None = None,
 ) -> Hierarchy:
     """Compute a scene at every step of the model hierarchy.
@@ -166,17 +156,17 @@ def hierarchy_of(
             "[focus], or use skinwave compare"
         )
     announce(progress, "choose models")
-    names = droppable(scene)
-    check_rate(update_rate)
+    names = assumptions.droppable(scene)
+    assumptions.check_rate(update_rate)
     path = scene.tacton.trajectory
     if "continuous path" in names:
-        path = device_path(path, update_rate, points)
+        path = assumptions.device_path(path, update_rate, points)
     first_step = "as published"  # step of the model point-kernel-published
     up = [(first_step, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
-    side = [(dropped[-1], dropped)] if (dropped := side_step(scene)) else []
+    side = [(dropped[-1], dropped)] if (dropped := assumptions.side_step(scene)) else []
     leave_one_out = [  # except the last, which is a step
         (f"all but: {name}", tuple(n for n in names if n != name))
-        for name in names[:-1] if can_be_alone(name, names, scene, h)
+        for name in names[:-1] if assumptions.can_be_alone(name, names, scene, h)
     ]  # fmt: skip
     steps: list[HierarchyStep] = []
     scenes: list[Scene] = []
@@ -184,14 +174,14 @@ def hierarchy_of(
         step = HierarchyStep(name=name, dropped=dropped, model="none")
         changed = scene
         try:
-            changed, model = without(scene, dropped, path=path, h=h)
+            changed, model = assumptions.without(scene, dropped, path=path, h=h)
             step = replace(step, model=named(model).name, body=changed.body)
         except REASONS as error:
             step = replace(step, error=reason(error))
         steps.append(step)
         scenes.append(changed)
     steps = _with_shared_models(steps, scenes, len(up))
-    line = _outward(scene, scenes[len(up) - 1].body, element_size(scene, h))
+    line = _outward(scene, scenes[len(up) - 1].body, assumptions.element_size(scene, h))
     more = tuple(map(tuple, line.probes.tolist())) if line else ()
     submitted: list[Future[tuple[Response, float, int]] | None] = []
     with (
@@ -203,7 +193,9 @@ def hierarchy_of(
                 submitted.append(None)
                 continue
             is_reduced = named(step.model).is_reduced
-            size = h or min(element_size(scene), element_size(changed)) if is_reduced else h
+            size = h
+            if is_reduced and not h:
+                size = min(map(assumptions.element_size, (scene, changed)))
             workers = large if is_reduced else small
             submitted.append(workers.submit(_time, changed, more, step.model, size, cache))
         for k, future in enumerate(submitted):
@@ -393,7 +385,7 @@ def _change_text(e: Effect) -> str:
     time = f"{e.seconds:.1f} s more" if e.seconds > 0.05 else "no extra time"  # which rounds to 0
     *first, last = changes
     text = f"{', '.join(first)}, and {last}" if first else last
-    return f"{text}. Then {ASSUMPTIONS[e.name]}, which takes {time}."
+    return f"{text}. Then {assumptions.ASSUMPTIONS[e.name]}, which takes {time}."
 
 
 def _place(e: Effect) -> str:

@@ -8,14 +8,7 @@ import sys
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    CancelledError,
-    Executor,
-    Future,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
@@ -89,7 +82,7 @@ def run_all(
                         waiting.extendleft(reversed(piece))
                         broken = True
                 polling = None if scheduler in LOCAL else 5  # s: new workers then get pieces
-                for future in wait(running, polling, FIRST_COMPLETED).done:
+                for future in wait(running, polling, "FIRST_COMPLETED").done:
                     piece, error = running.pop(future), future.exception()
                     if type(error).__name__ in ("BrokenProcessPool", "KilledWorker"):
                         killed.update(piece)

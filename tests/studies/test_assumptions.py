@@ -191,7 +191,7 @@ def test_relax_writes_effects_and_costs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     scene = replace(SKIN, body=Body(width=0.032, height=0.032, depth=0.004))  # too thin for layers
     names = tuple(n for n in droppable(scene) if n not in ("flat", "one material"))
-    monkeypatch.setattr(relax, "droppable", lambda scene: names)
+    monkeypatch.setattr(assumptions, "droppable", lambda scene: names)
     (tmp_path / "scene.toml").write_text(dumps(scene))
     assert main(["relax", "scene.toml", "--element-size", "9", "--quiet"]) == 0
     coarse = "elements of 9 mm are too coarse for the focal spot"
@@ -237,8 +237,10 @@ def test_a_step_after_a_failed_one_has_no_effect():
 
 def pretend(monkeypatch, names, step):
     """Other assumptions, and other scenes and models without them."""
-    monkeypatch.setattr(relax, "droppable", lambda scene: names)
-    monkeypatch.setattr(relax, "without", lambda scene, dropped, **device: step(scene, dropped))
+    monkeypatch.setattr(assumptions, "droppable", lambda scene: names)
+    monkeypatch.setattr(
+        assumptions, "without", lambda scene, dropped, **device: step(scene, dropped)
+    )
     monkeypatch.setattr(relax, "all_warnings", lambda *scene, h: ())
 
 
@@ -261,7 +263,7 @@ def test_a_failed_step_comes_before_the_ranking(tmp_path, monkeypatch, capsys):
         return scene, "point-kernel" if dropped else "point-kernel-published"
 
     pretend(monkeypatch, ("linear drive", "sinc^2 profile", "main lobe only"), step)
-    monkeypatch.setattr(relax, "side_step", lambda scene: ())
+    monkeypatch.setattr(assumptions, "side_step", lambda scene: ())
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(dumps(SKIN))
     assert main(["relax", "scene.toml"]) == 1

@@ -13,7 +13,6 @@ from simple_model import Tacton
 from skinwave.bodies.flattened import flatten
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import BODIES, Body, Layer, Placement
-from skinwave.studies import relax
 from skinwave.studies.assumptions import without
 from skinwave.studies.outward import Outward, outward
 from skinwave.studies.relax import hierarchy_of
@@ -60,7 +59,7 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize("kind", BODY)
 def test_waves_are_a_step_of_every_body(kind, folder, monkeypatch):
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(relax, "can_be_alone", lambda *step: False)
+    monkeypatch.setattr("skinwave.studies.assumptions.can_be_alone", lambda *step: False)
     found = hierarchy_of(scene_of(BODY[kind]), lambda phase, done: None, h=H)
     assert found.failures == {}
     effects = {effect.name: effect for effect in found.effects()}
