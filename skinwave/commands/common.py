@@ -102,22 +102,20 @@ def add_model(parser: argparse.ArgumentParser, *, has_steps: bool = True) -> Non
         )
 
 
-def solving(options: argparse.Namespace, progress: "Progress", **more: Any) -> "SolveOptions":
-    """Return the element size and the solver of a command as `SolveOptions`."""
+def solving(options: argparse.Namespace, progress: "Progress") -> "SolveOptions":
+    """Return those options of a command that are `SolveOptions`."""
     from skinwave.models.options import SolveOptions
 
-    return SolveOptions(h=metre(options.h), solver=options.solver, progress=progress, **more)
+    names = {"model", "tolerance", "dt", "solver"} & vars(options).keys()
+    given: dict[str, Any] = {name: getattr(options, name) for name in names}
+    return SolveOptions(h=metre(options.h), progress=progress, **given)
 
 
-def plan_of_command(options: argparse.Namespace, scene: "Scene", **more: Any) -> "Plan":
+def plan_of_command(options: argparse.Namespace, scene: "Scene", progress: "Progress") -> "Plan":
     """Plan a scene with the options of a command, and print the warnings of the plan."""
-    from skinwave.models.options import SolveOptions
     from skinwave.planning.plan import plan
 
-    found = plan(scene, SolveOptions(
-        model=options.model, tolerance=options.tolerance, h=metre(options.h), dt=options.dt,
-        solver=options.solver, **more,
-    ))  # fmt: skip
+    found = plan(scene, solving(options, progress))
     warn(found.warnings)
     return found
 

@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
         if given is None:  # a palm takes minutes on the live page, a flat slab a second
             live.append(with_body(live[-1], BODIES["skin-slab"]))
         outcome = run_study(
-            scenes, folder, common.solving(options, progress, model=options.model), title=title,
+            scenes, folder, common.solving(options, progress), title=title,
             command=record.command_entry(options)["typed"], measured=measured, live=live,
         )  # fmt: skip
     common.warn(outcome.warnings)

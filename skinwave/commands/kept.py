@@ -1,4 +1,4 @@
-"""Results of commands in the cache: an unchanged command copies what it wrote before.
+"""Results of commands in the cache: an unchanged command copies its earlier result.
 
 A result depends on the options of its command, the content of the files that these name, the code,
 and the versions of its libraries. Results with failed parts, and those of extensions, are not kept.
@@ -49,11 +49,8 @@ def _name(options: argparse.Namespace) -> str | None:
     given = record.command_entry(options)["options"]
     if os.environ.get(VARIABLE) or ("source" in given and os.path.isdir(given["source"])):
         return None
-    files = {
-        key: Path(value)
-        for key, value in given.items()
-        if isinstance(value, str) and os.path.isfile(value)
-    }
+    texts = {key: value for key, value in given.items() if isinstance(value, str)}
+    files = {key: Path(value) for key, value in texts.items() if os.path.isfile(value)}
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the command itself warns

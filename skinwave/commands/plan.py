@@ -23,7 +23,7 @@ def run(options: argparse.Namespace) -> int:
 
     scene = read(options.scene)
     with common.progress_of(options) as progress:
-        found = common.plan_of_command(options, scene, progress=progress)
+        found = common.plan_of_command(options, scene, progress)
         announce(progress, "uncertainty")
         row = mesh_row(replace(scene, body=found.body), found.h, found.error)
     found = replace(found, rows=(*found.rows, row))

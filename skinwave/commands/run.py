@@ -40,12 +40,11 @@ def run(options: argparse.Namespace) -> int:
         common.result_folder(options, f"{options.scene.stem}-out", scene) as (folder, progress),
         pool(1) as workers,
     ):
-        solving = common.solving(options, progress, model=options.model)
-        moved = begin_surface(scene, solving, workers)
+        moved = begin_surface(scene, common.solving(options, progress), workers)
         gallery = Gallery(workers=workers, progress=progress)
         if moved:
             gallery = begin_gallery(scene, moved, workers, progress)
-        plan = common.plan_of_command(options, scene, progress=progress)
+        plan = common.plan_of_command(options, scene, progress)
         response = solve_as_planned(scene, plan)
         common.warn(w for w in response.effort.warnings if w not in plan.warnings)
         run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)

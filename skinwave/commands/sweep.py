@@ -111,7 +111,6 @@ def _sweep(
     options: argparse.Namespace, out: Path
 ) -> tuple[dict[str, Any], list[str], dict[str, str], dict[str, Figure]]:
     """Run the missing points of the design; return a summary, sentences, failures and figures."""
-    from skinwave.models.options import SolveOptions
     from skinwave.report.styles import style
     from skinwave.results import record
     from skinwave.scene.distributions import Spread
@@ -120,6 +119,7 @@ def _sweep(
     from skinwave.sweeps.sampling import check_seed
     from skinwave.sweeps.sweep import Sweep
     from skinwave.sweeps.table_figures import best_figure
+    from skinwave.system.effort import silent
 
     check_seed(options.seed)
     is_sampled = options.design in SAMPLED
@@ -134,10 +134,7 @@ def _sweep(
     has_page = len(spreads) == len(variations)
     tables = uncertainty_page.SAMPLED_FILES if has_page else ()
     dataset.check_own_files(out, [*tables, *[dataset.CSV] * options.csv])  # before any run
-    solving = SolveOptions(
-        model=options.model, tolerance=options.tolerance, h=common.metre(options.h),
-        solver=options.solver,
-    )  # fmt: skip
+    solving = common.solving(options, silent)  # the processes of runs have no progress
     points = cases(options.scene, combined)
     optimum, files, failures = tuple[best.Best, ...](), list[str](), dict[str, str]()
     figures = dict[str, Any]()

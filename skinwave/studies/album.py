@@ -249,10 +249,11 @@ def _misfit(run: Run, moved: BodyMotion) -> float:
     return float(np.linalg.norm(difference)) / (float(np.linalg.norm(values)) or 1.0)
 
 
-def open_album(folder: Path) -> Album:
+def open_album(folder: Path, columns: Sequence[str] = ()) -> Album:
     """Read the results in a folder of `run`, `compare` or `report`, without any computation.
 
-    Raises a ValueError if the folder has no results.
+    `columns` select models, such as "point-kernel"; all by default. Raises a ValueError if the
+    folder has no results or no such column.
     """
     scenes = (path.parent for path in folder.rglob("scene.toml"))
     responses = [path for home in scenes if (path := home / record.RESPONSES).is_file()]
@@ -261,17 +262,21 @@ def open_album(folder: Path) -> Album:
         raise ValueError(
             f"{folder} contains no {record.RESPONSES}. Give a scene file or a result folder"
         )
-    saved = [views.load(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
     own, scene_of = folder / "scene.toml", {run.column: run.scene for run in runs}
     scene = read(own) if own.exists() else runs[-1].scene
+    for name in columns:
+        choose("column", name, scene_of)
+    shown = {name: each for name, each in scene_of.items() if name in (columns or scene_of)}
+    saved = [views.load(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
     maps = {
-        name: surface.load(path, scene_of[name])
+        name: surface.load(path, shown[name])
         for path in sorted(folder.glob("*/map.npz"), key=_order)
-        if (name := path.parent.name) in scene_of
+        if (name := path.parent.name) in shown
     }
     return Album(
-        title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
-        views={view.column: view for view in saved}, maps=maps,
+        title=scene.name if own.exists() else folder.resolve().name, scene=scene, maps=maps,
+        runs=[run for run in runs if run.column in shown],
+        views={view.column: view for view in saved if view.column in shown},
         planned=_read_json(folder / "plan.json", PLAN),
     )  # fmt: skip
 
@@ -312,20 +317,3 @@ def _read_json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
         return None
     content: dict[str, Any] = fitting(reading.load_json(path), pattern, str(path))
     return content
-
-
-def select_columns(album: Album, columns: Sequence[str]) -> Album:
-    """Return an album with some columns, such as "point-kernel", or with all if none is given.
-
-    Raises a ValueError if a column is unknown.
-    """
-    known = list(dict.fromkeys(run.column for run in album.runs))
-    for name in columns:
-        choose("column", name, known)
-    selected = columns or known
-    return replace(
-        album,
-        runs=[run for run in album.runs if run.column in selected],
-        views={name: view for name, view in album.views.items() if name in selected},
-        maps={name: each for name, each in album.maps.items() if name in selected},
-    )

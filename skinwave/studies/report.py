@@ -32,7 +32,7 @@ from skinwave.results.views import View
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene
 from skinwave.studies import dispersion
-from skinwave.studies.album import Album, open_album, select_columns
+from skinwave.studies.album import Album, open_album
 from skinwave.studies.first_screen import Maps, first_screen, with_kernels
 from skinwave.studies.pages import MARKS, Gallery, page_of, side_by_side
 from skinwave.system.document import Choice, Details, Part, Picture, Report, Section, inner_page
@@ -59,7 +59,7 @@ def write_report(
     parts in `failures`. Returns the reasons of all parts that failed. Raises a ValueError if the
     folder has no result or no such column.
     """
-    album = select_columns(open_album(results), columns)
+    album = open_album(results, columns)
     with pool(1) as workers:
         gallery = Gallery(
             style=style, formats=formats, workers=workers, progress=progress,

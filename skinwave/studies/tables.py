@@ -61,8 +61,9 @@ def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> 
         return [size]
     if (level := levels.get(name)) is None:
         return [size, ""]
-    exact = f"{round(level):+d}" if round(level) else "0"
-    return [size, decibel(level) if level < FAINTEST else exact]
+    if level < FAINTEST:
+        return [size, decibel(level)]
+    return [size, f"{round(level):+d}" if round(level) else "0"]
 
 
 def _unnamed_rows(runs: Sequence[Run], probe: int, most: int) -> Iterator[list[object]]:

@@ -94,9 +94,9 @@ class SweepTable:
         return ax
 
     def __repr__(self) -> str:
-        text = f"{plural(len(self), 'run')} over {', '.join(self.varied)}"
-        text += f"; {len(self.columns)} columns"
-        return f"<SweepTable: {text}{f', {len(self.failed)} failed' * bool(self.failed)}>"
+        failed = f", {len(self.failed)} failed" * bool(self.failed)
+        runs = f"{plural(len(self), 'run')} over {', '.join(self.varied)}"
+        return f"<SweepTable: {runs}; {len(self.columns)} columns{failed}>"
 
     def _repr_html_(self) -> str:
         most_rows, results = 20, ("peak_um", "rms_um", "level_db", "expected_error")

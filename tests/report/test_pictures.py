@@ -422,8 +422,9 @@ def test_a_report_is_drawn_again_without_a_model_or_gl(folder, tmp_path, monkeyp
     def run(*arguments, **options):
         raise AssertionError("a model was run")
 
-    for name in ("whole_motion", "plan", "compute", "solve_as_planned", "kernel_view"):
+    for name in ("whole_motion", "plan", "compute", "solve_as_planned"):
         monkeypatch.setattr(album, name, run)
+    monkeypatch.setattr(views, "kernel_view", run)
     monkeypatch.setattr(report, "renderer", lambda: NO_GL)
     blank = BytesIO()  # what is on the figures is looked at in those of `page`
     Image.new("RGB", (8, 8)).save(blank, "PNG")
