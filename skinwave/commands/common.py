@@ -102,7 +102,7 @@ def add_model(parser: argparse.ArgumentParser, *, has_steps: bool = True) -> Non
         )
 
 
-def solving(options: argparse.Namespace, progress: "Progress") -> "SolveOptions":
+def solve_options(options: argparse.Namespace, progress: "Progress") -> "SolveOptions":
     """Return those options of a command that are `SolveOptions`."""
     from skinwave.models.options import SolveOptions
 
@@ -115,7 +115,7 @@ def plan_of_command(options: argparse.Namespace, scene: "Scene", progress: "Prog
     """Plan a scene with the options of a command, and print the warnings of the plan."""
     from skinwave.planning.plan import plan
 
-    found = plan(scene, solving(options, progress))
+    found = plan(scene, solve_options(options, progress))
     warn(found.warnings)
     return found
 
@@ -189,7 +189,7 @@ def result_folder(
             record.write(folder, record.command_entry(options), scene=scene)
 
 
-def closing(
+def summarise_page(
     options: argparse.Namespace, sentences: list[str], failures: Mapping[str, str] | None = None,
     **summary: Any,
 ) -> int:  # fmt: skip

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene import paper15
     from skinwave.scene.file import read
     from skinwave.scene.scene import BODIES, with_body
-    from skinwave.studies.first_screen import first_name
+    from skinwave.studies.first_screen import first_tacton
     from skinwave.studies.study import own_scenes, paper_scenes, run_study
 
     given = None if options.scene == PAPER else read(options.scene)
@@ -66,11 +66,11 @@ def run(options: argparse.Namespace) -> int:
         out = f"{Path(options.scene).stem}-compared"
     inputs = [body.file for body in bodies.values()] + [options.scene] * (given is not None)
     with common.result_folder(options, out, given, inputs) as (folder, progress):
-        live = list(scenes[first_name(scenes)].values())
+        live = list(scenes[first_tacton(scenes)].values())
         if given is None:  # a palm takes minutes on the live page, a flat slab a second
             live.append(with_body(live[-1], BODIES["skin-slab"]))
         outcome = run_study(
-            scenes, folder, common.solving(options, progress), title=title,
+            scenes, folder, common.solve_options(options, progress), title=title,
             command=record.command_entry(options)["typed"], measured=measured, live=live,
         )  # fmt: skip
     common.warn(outcome.warnings)
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
         f"{outcome.runs} of {outcome.planned} runs in {outcome.seconds:.0f} s, {memory:.2f} GiB; "
         f"{held} of {len(claims)} claims hold"
     )
-    code = common.closing(
+    code = common.summarise_page(
         options, [*outcome.conclusions, sentence], outcome.failures, runs=outcome.runs,
         planned=outcome.planned, claims_held=held, claims_assessed=len(claims),
         warnings=outcome.warnings,

@@ -2,7 +2,7 @@
 
 import argparse
 
-from skinwave.commands.common import add_output, add_scene, closing, result_folder
+from skinwave.commands.common import add_output, add_scene, result_folder, summarise_page
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -31,4 +31,4 @@ def run(options: argparse.Namespace) -> int:
     found = driven_modes(scene, highest=options.highest, most=options.modes)
     with result_folder(options, f"{options.scene.stem}-dispersion", scene) as (folder, _):
         write(folder, found)
-    return closing(options, sentences(found))
+    return summarise_page(options, sentences(found))

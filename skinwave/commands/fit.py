@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
         write(folder, found)
     if not options.json and not options.quiet:
         common.warn(cautions(found))
-    code = common.closing(options, failures=found.solution.failures, **summary(found))
+    code = common.summarise_page(options, failures=found.solution.failures, **summary(found))
     return code if found.solution.converged else 1
 
 

@@ -3,7 +3,14 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_output, add_size, closing, metre, result_folder, warn
+from skinwave.commands.common import (
+    add_output,
+    add_size,
+    metre,
+    result_folder,
+    summarise_page,
+    warn,
+)
 
 BOTH = "paper-vs-skin"
 
@@ -50,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     warn(warnings)
     effects = found.effects()
     sentences = [*filter(None, [unknown_text(found, effects)]), *map(sentence, effects)]
-    return closing(options, sentences, found.failures, warnings=warnings)
+    return summarise_page(options, sentences, found.failures, warnings=warnings)
 
 
 def _paper_vs_skin(options: argparse.Namespace) -> int:
@@ -61,4 +68,4 @@ def _paper_vs_skin(options: argparse.Namespace) -> int:
     with result_folder(options, BOTH) as (folder, progress):
         found = paper_vs_skin(progress, h=metre(options.h))
         report(found).write(folder)
-    return closing(options, sentences(found), found.failures)
+    return summarise_page(options, sentences(found), found.failures)

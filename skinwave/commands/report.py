@@ -96,7 +96,7 @@ def _page(options: argparse.Namespace) -> int:
     with common.result_folder(options, f"{source.stem}-report", scene) as (folder, progress):
         if scene is not None:
             warnings, failures = write_album(
-                folder, scene, common.solving(options, progress), beside=options.beside
+                folder, scene, common.solve_options(options, progress), beside=options.beside
             )
             common.warn(warnings)
         failures = write_report(
@@ -104,7 +104,9 @@ def _page(options: argparse.Namespace) -> int:
             columns=options.only, command=command["typed"] if scene else "", failures=failures,
         )  # fmt: skip
         size = (folder / "index.html").stat().st_size / 1e6
-    return common.closing(options, [f"page of {size:.1f} MB"], failures, megabytes=round(size, 2))
+    return common.summarise_page(
+        options, [f"page of {size:.1f} MB"], failures, megabytes=round(size, 2)
+    )
 
 
 def _map(options: argparse.Namespace) -> int:
@@ -120,10 +122,10 @@ def _map(options: argparse.Namespace) -> int:
     reach = 30.0 if options.reach is None else options.reach  # mm
     step = 1.0 if options.step is None else options.step
     with common.result_folder(options, f"{options.source.stem}-map", scene) as (folder, progress):
-        given = common.solving(options, progress)
+        given = common.solve_options(options, progress)
         found = quantity_map(scene, given, reach=reach / 1e3, step=step / 1e3)
         write_map(folder, scene, found)
-    return common.closing(options, map_sentences(scene, found))
+    return common.summarise_page(options, map_sentences(scene, found))
 
 
 def _film(options: argparse.Namespace) -> int:
@@ -168,7 +170,7 @@ def _views(
     if not options.source.is_dir():
         views, warnings, failures = quantity_views(
             replace(_scene(options), depth=0.0),  # a film shows the surface
-            common.solving(options, progress), frames=options.frames, beside=options.beside,
+            common.solve_options(options, progress), frames=options.frames, beside=options.beside,
         )  # fmt: skip
         common.warn(warnings)
         return views, failures

@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         common.result_folder(options, f"{options.scene.stem}-out", scene) as (folder, progress),
         pool(1) as workers,
     ):
-        moved = begin_surface(scene, common.solving(options, progress), workers)
+        moved = begin_surface(scene, common.solve_options(options, progress), workers)
         gallery = Gallery(workers=workers, progress=progress)
         if moved:
             gallery = begin_gallery(scene, moved, workers, progress)

@@ -134,7 +134,7 @@ def _sweep(
     has_page = len(spreads) == len(variations)
     tables = uncertainty_page.SAMPLED_FILES if has_page else ()
     dataset.check_own_files(out, [*tables, *[dataset.CSV] * options.csv])  # before any run
-    solving = common.solving(options, silent)  # the processes of runs have no progress
+    solving = common.solve_options(options, silent)  # the processes of runs have no progress
     points = cases(options.scene, combined)
     optimum, files, failures = tuple[best.Best, ...](), list[str](), dict[str, str]()
     figures = dict[str, Any]()

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_output, closing, result_folder, summarise
+from skinwave.commands.common import add_output, result_folder, summarise, summarise_page
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -54,7 +54,7 @@ def _cases(options: argparse.Namespace) -> int:
     sentences = [suite.summary(results)]
     if is_incomplete:
         sentences.append(f"interrupted after {len(results)} of {len(cases)} cases")
-    code = closing(
+    code = summarise_page(
         options, sentences, failures, passed=len(results) - len(failures), failed=len(failures),
         planned=len(cases), seconds=round(sum(result.seconds for result in results), 1),
     )  # fmt: skip
@@ -67,7 +67,7 @@ def _run_published(options: argparse.Namespace) -> int:
     with result_folder(options, "validation") as (folder, progress):
         curves, rows = validate(progress, hand=options.hand)
         report(curves, rows).write(folder)
-    return closing(options, verdict(rows))
+    return summarise_page(options, verdict(rows))
 
 
 def _tradeoff(options: argparse.Namespace) -> int:
@@ -78,7 +78,7 @@ def _tradeoff(options: argparse.Namespace) -> int:
     with result_folder(options, name, scene) as (folder, progress):
         found = tradeoff(scene, progress)
         write(folder, scene, found)
-    return closing(options, sentences(found), found.failures, accepted=found.is_converged)
+    return summarise_page(options, sentences(found), found.failures, accepted=found.is_converged)
 
 
 def _installation(options: argparse.Namespace) -> int:

@@ -39,15 +39,18 @@ def whole_period(pressure: MovingPressure) -> float | None:
 
 
 def played_part(
-    pressure: MovingPressure, fastest: float, frames: int | None = None
+    pressure: MovingPressure, fastest: float | None = None, frames: int | None = None
 ) -> tuple[float, int]:
     """Return the duration in s and the number of frames of an animation.
 
     The duration is the period of the whole pattern, or the time after which it nearly repeats. The
-    number of frames follows from the `fastest` strong line in Hz, unless given. If this exceeds
-    the limit, only a part is played: that with the smallest phase jump.
+    number of frames, unless given, follows from the `fastest` strong line in Hz, by default the
+    fastest repetition. If it exceeds the limit, only the part with the smallest phase jump is
+    played.
     """
     span, tacton = pattern_period(pressure.tacton), pressure.tacton
+    if fastest is None:
+        fastest = max(repetition_frequencies(tacton).values(), default=0.0)
     needed = ceil(FRAMES.per_period * fastest * span * (1 - FRAMES.same_phase))
     if needed > (most := max(FRAMES.most, frames or 0)):
         longest = min(tacton.duration, most / FRAMES.per_period / fastest)

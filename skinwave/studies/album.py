@@ -18,7 +18,6 @@ import numpy as np
 from meshes import reading
 from simple_model import Response
 from simple_model.choices import choose
-from simple_model.load.tacton import repetition_frequencies
 from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
@@ -142,7 +141,9 @@ def compute_views(
     meshed = {c: each for c, each in columns.items() if _has_elements(each, options.h)}
     moved: dict[str, BodyMotion] = {}
     with ThreadPoolExecutor(1) as beside_plans:
-        moving = {c: beside_plans.submit(_pictured, each, options) for c, each in meshed.items()}
+        moving = {
+            c: beside_plans.submit(_coarse_motion, each, options) for c, each in meshed.items()
+        }
         plans = {
             column: plan(each, options)
             for column, each in columns.items() if each.body.of_kind.discretise
@@ -151,8 +152,7 @@ def compute_views(
             progress(pictured := f"pictures of {column}", 0.0)
             with or_failed(failures, pictured):
                 moved[column] = future.result()
-    tones = max(repetition_frequencies(scene.tacton).values(), default=0.0)
-    fastest = max(map(views.fastest_line, moved.values()), default=tones)
+    fastest = max(map(views.fastest_line, moved.values()), default=None)
     part = played_part(scene.pressure, fastest, frames)  # all views play the same part
     reach = _reach(columns, moved)
     for column, each in columns.items():
@@ -181,7 +181,7 @@ def compute_views(
         raise ValueError(failure_text(failures))
 
 
-def _pictured(scene: Scene, options: SolveOptions) -> BodyMotion:
+def _coarse_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
     """Return the motion of a body for pictures."""
     larger = 1.5  # element size of pictures over the default one, at a fifth of the time
     size = options.h or larger * default_size(scene.body)

@@ -90,7 +90,7 @@ def first_screen(
     checks: Mapping[str, Run] | None = None,
 ) -> FirstScreen | None:
     """Return the first screen, or None unless a body and both kernels were run."""
-    group = groups.get(first_name(groups), [])
+    group = groups.get(first_tacton(groups), [])
     kernel, published = _run_of(group, SAME_LOAD.name), _run_of(group, PUBLISHED.name)
     bodies = [run for run in group if run.is_motion]
     if kernel is None or published is None or not bodies:
@@ -147,7 +147,7 @@ def beside_kernel(scene: Scene, own: SurfaceField) -> tuple[SurfaceField, Surfac
     return own, kernel_map(scene.pressure, own.x, own.y)
 
 
-def first_name(names: Iterable[str]) -> str:
+def first_tacton(names: Iterable[str]) -> str:
     """Return the name of the Tacton on the first screen."""
     names = list(names)
     preferred = "am140-stm20"  # the paper's Tacton with both modulations in the middle

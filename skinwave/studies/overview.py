@@ -134,7 +134,7 @@ def sentences(effects: Effects, groups: Mapping[str, Sequence[Run]]) -> list[str
     halves = {c: v for c in columns if len(v := _values(effects, NUMBERS[0], c))}
     parts = []
     if halves:
-        each = _listed(f"{_text(v, 'mm')} on the {label(c)}" for c, v in halves.items())
+        each = _in_words(f"{_text(v, 'mm')} on the {label(c)}" for c, v in halves.items())
         parts.append(
             f"Under the same {len(effects)} loads, half of the motion lies within "
             f"{_text(kernel, 'mm')} of the path in the kernel, {each}: waves carry it out of the "
@@ -143,7 +143,7 @@ def sentences(effects: Effects, groups: Mapping[str, Sequence[Run]]) -> list[str
     gains = {c: _gains(effects, groups, c) for c in columns}
     most = max(gains, key=lambda c: len(gains[c]))
     if gains[most]:
-        others = _listed([f"{label(c)}: {len(own)}" for c, own in gains.items() if c != most])
+        others = _in_words([f"{label(c)}: {len(own)}" for c, own in gains.items() if c != most])
         parts.append(
             f"On the {label(most)} the strongest line is another than the kernel's in "
             f"{len(gains[most])} of {len(effects)} Tactons{f' ({others})' * bool(others)}, because "
@@ -171,7 +171,7 @@ def _gains(effects: Effects, groups: Mapping[str, Sequence[Run]], column: str) -
     return gains
 
 
-def _listed(texts: Iterable[str]) -> str:
+def _in_words(texts: Iterable[str]) -> str:
     """Return texts as a list in words."""
     *first, last = [*texts] or [""]
     return f"{', '.join(first)} and {last}" if first else last

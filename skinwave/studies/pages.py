@@ -40,7 +40,7 @@ from skinwave.scene import paper15
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene, body_name
 from skinwave.studies import first_screen, overview, tables
-from skinwave.studies.first_screen import FirstScreen, effects_of, first_name, with_kernels
+from skinwave.studies.first_screen import FirstScreen, effects_of, first_tacton, with_kernels
 from skinwave.studies.surfaces import Found, Surface, Surfaces, quick_surface, views_of
 from skinwave.system import document
 from skinwave.system.document import Choice, Details, Part, Picture, Report, Section
@@ -118,7 +118,7 @@ def page_of(
     runs = [run for group in groups.values() for run in group]
     is_single = len(groups) == 1
     at_rest = _begin_pictures(runs, gallery) if is_single else {}
-    drawn = _drawn(figures or groups, gallery)
+    drawn = _draw_each(figures or groups, gallery)
     gallery.progress("draw maps", 0.0)
     own = _first_parts(first, gallery) if first else []
     gallery.progress("draw maps", 0.5)
@@ -280,10 +280,12 @@ def _efforts_by_body(runs: Sequence[Run]) -> dict[str, Effort]:
     }  # fmt: skip
 
 
-def _drawn(groups: Mapping[str, Sequence[Run]], gallery: Gallery) -> Iterator[dict[str, Picture]]:
+def _draw_each(
+    groups: Mapping[str, Sequence[Run]], gallery: Gallery
+) -> Iterator[dict[str, Picture]]:
     """Yield the figures of each Tacton by their titles, the first one first."""
     files = dict(zip(groups, distinct_names(groups), strict=True))
-    names = sorted(groups, key=lambda each: each != first_name(groups))
+    names = sorted(groups, key=lambda each: each != first_tacton(groups))
     draw = gallery.workers.map if gallery.workers else map
     alone = Gallery(style=gallery.style, formats=gallery.formats)
     one = partial(_tacton_pictures, alone, len(groups) == 1)

@@ -17,20 +17,28 @@ from skinwave.models import named
 from skinwave.models.limits import check_takes
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
+from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import ReducedBody, answer, reduce_scene
 from skinwave.planning.assessment import assess, coarser_body
 from skinwave.planning.plan import cheapest_model, plan
 from skinwave.planning.simulate import compute, solve_as_planned
 from skinwave.results.claims import AssessedClaim, assessable_runs, evaluate, write_claims
 from skinwave.results.files import write_lines, write_responses, write_run
+from skinwave.results.playback import played_part
 from skinwave.results.run import Run
 from skinwave.scene import paper15
 from skinwave.scene.scene import Body, Scene
 from skinwave.studies import surfaces
 from skinwave.studies.album import scene_columns
-from skinwave.studies.first_screen import Maps, first_name, first_screen, has_quick_map, quick_maps
+from skinwave.studies.first_screen import (
+    Maps,
+    first_screen,
+    first_tacton,
+    has_quick_map,
+    quick_maps,
+)
 from skinwave.studies.pages import Gallery, efforts_of, page_of
-from skinwave.studies.surfaces import Part, Surfaces
+from skinwave.studies.surfaces import Playback, Surfaces
 from skinwave.system import document
 from skinwave.system.effort import Progress, one_thread, peak_memory, silent
 from skinwave.system.failures import failure_text, or_failed
@@ -134,7 +142,7 @@ def run_study(
         write_responses(folder / "responses.npz", by_name)
         first = None
         if not interrupted:
-            views = surfaces.views_of(scenes[first_name(scenes)], found.surfaces)
+            views = surfaces.views_of(scenes[first_tacton(scenes)], found.surfaces)
             first = first_screen(groups, found.maps, views, found.checks)
         parts: list[document.Part] = []
         with or_failed(failed, "live page"):
@@ -250,8 +258,8 @@ def _runs(
     size_of = {column: replace(options, h=options.h or sizes.get(column)) for column in reduced}
     coarse = {column: s for _, column, s in every if several and column in reduced}
     coarser = {c: workers.submit(coarser_body, s, options, sizes.get(c)) for c, s in coarse.items()}
-    pictured = first_name(scenes)
-    part = surfaces.played(scenes[pictured])
+    pictured = first_tacton(scenes)
+    part = played_part(scenes[pictured][SAME_LOAD.name].pressure)
     meshed = {
         column: {name: group[column] for name, group in scenes.items() if column in group}
         for _, column, s in every
@@ -317,7 +325,7 @@ def _report(progress: Progress, column: str, phase: str, fraction: float) -> Non
 
 
 def _response(
-    name: str, column: str, scene: Scene, options: SolveOptions, part: Part | None
+    name: str, column: str, scene: Scene, options: SolveOptions, part: Playback | None
 ) -> tuple[Response, tuple[Surfaces, dict[str, str]]]:
     """Return a response and, of a body whose surface needs no mesh, its map and view."""
     if not scene.body.of_kind.discretise:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simple_model.load.tacton import repetition_frequencies
 from skinwave.models import named
 from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.limits import takes
@@ -18,15 +17,14 @@ from skinwave.results.playback import played_part
 from skinwave.results.run import Run
 from skinwave.results.surface import element_map, grid, map_motions
 from skinwave.results.views import View, body_view, flat_view, kernel_view
-from skinwave.scene import paper15
 from skinwave.scene.scene import Scene, body_name, with_body
 from skinwave.studies import first_screen
 from skinwave.studies.assumptions import infinite
-from skinwave.studies.first_screen import Maps, first_name, has_quick_map
+from skinwave.studies.first_screen import Maps, first_tacton, has_quick_map
 from skinwave.system.effort import silent
 from skinwave.system.failures import or_failed
 
-Part = tuple[float, int]  # the duration in s and the number of frames that a view shows
+Playback = tuple[float, int]  # the duration in s and the number of frames that a view shows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,14 +39,7 @@ Surfaces = dict[tuple[str, str], Surface]  # by Tacton and column
 Found = tuple[Surfaces, dict[str, str]]  # and the reasons of failed parts
 
 
-def played(scenes: Mapping[str, Scene]) -> Part:
-    """Return the part of a Tacton that its views show, the same for all its scenes by column."""
-    scene = scenes[SAME_LOAD.name]
-    fastest = max(repetition_frequencies(scene.tacton).values(), default=0.0)
-    return played_part(scene.pressure, fastest)
-
-
-def quick_surface(run: Run, part: Part | None) -> Found:
+def quick_surface(run: Run, part: Playback | None) -> Found:
     """Return the map of a body whose surface needs no mesh, a view of the `part`, and failures."""
     failures: dict[str, str] = {}
     surface, body = Surface(), run.scene.body
@@ -61,7 +52,7 @@ def quick_surface(run: Run, part: Part | None) -> Found:
 
 
 def element_surfaces(
-    column: str, scenes: Mapping[str, Scene], options: SolveOptions, part: Part
+    column: str, scenes: Mapping[str, Scene], options: SolveOptions, part: Playback
 ) -> Found:
     """Return the maps of one meshed body under all Tactons, a view of the first, and failures."""
     names, failures = {scene: name for name, scene in scenes.items()}, dict[str, str]()
@@ -69,7 +60,7 @@ def element_surfaces(
     with or_failed(failures, f"map of {column}"):
         for scene, motion in map_motions(list(scenes.values()), options):
             view, name = None, names[scene]
-            if name == first_name(scenes):
+            if name == first_tacton(scenes):
                 view = replace(body_view(scene, column, motion, part), moved=None)
             own = element_map(scene, motion, *grid(scene))
             maps = first_screen.beside_kernel(scene, own)
@@ -86,10 +77,9 @@ def begin_surface(scene: Scene, options: SolveOptions, workers: Executor) -> "Fu
     is_drawn = scene.body.of_kind.discretise and has_motion and scene.load.is_plain
     if not is_drawn or has_quick_map(scene):
         return None
-    part = played({SAME_LOAD.name: paper15.beside_kernels(scene)[SAME_LOAD.name]})
-    silently = replace(options, progress=silent)
-    column = body_name(scene.body)
-    return workers.submit(element_surfaces, column, {scene.name: scene}, silently, part)
+    silently, part = replace(options, progress=silent), played_part(scene.pressure)
+    own = {scene.name: scene}
+    return workers.submit(element_surfaces, body_name(scene.body), own, silently, part)
 
 
 def views_of(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:
@@ -99,7 +89,8 @@ def views_of(scenes: Mapping[str, Scene], surfaces: Surfaces) -> list[View]:
     if not own:
         return []
     reach = np.max([np.abs(view.places).max(axis=0) for view in own], axis=0)
-    return [kernel_view(scenes[SAME_LOAD.name], reach, played(scenes)), *own]
+    kernel = scenes[SAME_LOAD.name]
+    return [kernel_view(kernel, reach, played_part(kernel.pressure)), *own]
 
 
 def flat_run(name: str, scene: Scene, options: SolveOptions) -> Run | None:

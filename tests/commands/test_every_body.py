@@ -57,7 +57,7 @@ def scene(blocks, monkeypatch, in_one_process, read_here):
     """The name of a scene's file with a body, in a folder with the meshes; few frames of films."""
     monkeypatch.chdir(blocks)
     monkeypatch.setattr(relax, "can_be_alone", lambda *step: False)
-    monkeypatch.setattr(playback, "FRAMES", playback.Frames(fewest=4))
+    monkeypatch.setattr(playback, "FRAMES", playback.Frames(fewest=4, most=4))
 
     def named(body):
         (blocks / f"{body}.toml").write_text(SCENE + BODY[body])
