@@ -51,7 +51,7 @@ HIGHEST = 600.0  # Hz, of the lines that are compared
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HierarchyStep:
-    """Step of the model hierarchy: dropped assumptions, model, body, and response or `error`.
+    """Step of the model hierarchy: dropped assumptions, model, scene, and response or `error`.
 
     On skin, `level` is the highest sensation level in dB at a probe, and `reach` the distance from
     the path up to which it is above 0 on the line of `outward`, or None.
@@ -60,13 +60,18 @@ class HierarchyStep:
     name: str
     dropped: tuple[str, ...]
     model: str
-    body: Body | None = None
+    scene: Scene | None = None
     response: Response | None = None
     level: float | None = None
     reach: Reach | None = None
     seconds: float = 0.0
     memory: int = 0
     error: str = ""
+
+    @property
+    def body(self) -> Body | None:
+        """Body of its scene."""
+        return self.scene.body if self.scene else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,47 +166,41 @@ def hierarchy_of(
     path = scene.tacton.trajectory
     if "continuous path" in names:
         path = assumptions.device_path(path, update_rate, points)
-    first_step = "as published"  # step of the model point-kernel-published
-    up = [(first_step, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
+    up = [("as published", ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
     side = [(dropped[-1], dropped)] if (dropped := assumptions.side_step(scene)) else []
     leave_one_out = [  # except the last, which is a step
         (f"all but: {name}", tuple(n for n in names if n != name))
         for name in names[:-1] if assumptions.can_be_alone(name, names, scene, h)
     ]  # fmt: skip
-    steps: list[HierarchyStep] = []
-    scenes: list[Scene] = []
-    for name, dropped in (*up, *side, *leave_one_out):
+
+    def step_of(name: str, dropped: tuple[str, ...]) -> HierarchyStep:
         step = HierarchyStep(name=name, dropped=dropped, model="none")
-        changed = scene
         try:
             changed, model = assumptions.without(scene, dropped, path=path, h=h)
-            step = replace(step, model=named(model).name, body=changed.body)
+            return replace(step, model=named(model).name, scene=changed)
         except REASONS as error:
-            step = replace(step, error=reason(error))
-        steps.append(step)
-        scenes.append(changed)
-    steps = _with_shared_models(steps, scenes, len(up))
-    line = _outward(scene, scenes[len(up) - 1].body, assumptions.element_size(scene, h))
+            return replace(step, error=reason(error))
+
+    steps = [step_of(name, dropped) for name, dropped in (*up, *side, *leave_one_out)]
+    steps = _with_shared_models(steps, len(up))
+    body = steps[len(up) - 1].body or scene.body
+    line = _outward(scene, body, assumptions.element_size(scene, h))
     more = tuple(map(tuple, line.probes.tolist())) if line else ()
-    submitted: list[Future[tuple[Response, float, int]] | None] = []
+    submitted: dict[int, Future[tuple[Response, float, int]]] = {}
     with (
         TemporaryDirectory(prefix="skinwave-") as cache,
         pool(1, renewed=True) as large, pool(1, renewed=True) as small,
     ):  # fmt: skip
-        for step, changed in zip(steps, scenes, strict=True):
-            if step.error:
-                submitted.append(None)
-                continue
-            is_reduced = named(step.model).is_reduced
-            size = h
-            if is_reduced and not h:
-                size = min(map(assumptions.element_size, (scene, changed)))
-            workers = large if is_reduced else small
-            submitted.append(workers.submit(_time, changed, more, step.model, size, cache))
-        for k, future in enumerate(submitted):
+        for k, step in enumerate(steps):
+            if step.scene:
+                is_reduced, size = named(step.model).is_reduced, h
+                if is_reduced and not h:
+                    size = min(map(assumptions.element_size, (scene, step.scene)))
+                workers = large if is_reduced else small
+                submitted[k] = workers.submit(_time, step.scene, more, step.model, size, cache)
+        for k, future in submitted.items():
             progress(steps[k].name, k / len(steps))
-            if future:
-                steps[k] = _compute(scene, steps[k], future, steps[:k], line)
+            steps[k] = _compute(scene, steps[k], future, steps[:k], line)
     first, second = len(up), len(up) + len(side)
     found = Hierarchy(
         scene=scene, steps=tuple(steps[:first]), side_steps=tuple(steps[first:second]),
@@ -212,9 +211,7 @@ def hierarchy_of(
     return found
 
 
-def _with_shared_models(
-    steps: Sequence[HierarchyStep], scenes: Sequence[Scene], count: int
-) -> list[HierarchyStep]:
+def _with_shared_models(steps: Sequence[HierarchyStep], count: int) -> list[HierarchyStep]:
     """Return the steps with one model for each solid, where it takes the load.
 
     It is the model of the last of the first `count` steps on this body. Both responses whose
@@ -223,13 +220,12 @@ def _with_shared_models(
     solids = [s for s in steps if s.body and s.body.is_solid and named(s.model).needs_body]
     last = {step.body: step.model for step in steps[:count] if step in solids}
 
-    def model(step: HierarchyStep, scene: Scene) -> str:
+    def model(step: HierarchyStep) -> str:
         shared = last.get(step.body, step.model)
-        return shared if step in solids and takes(named(shared), scene) else step.model
+        is_taken = step in solids and step.scene and takes(named(shared), step.scene)
+        return shared if is_taken else step.model
 
-    return [
-        replace(step, model=model(step, scene)) for step, scene in zip(steps, scenes, strict=True)
-    ]
+    return [replace(step, model=model(step)) for step in steps]
 
 
 def _outward(scene: Scene, body: Body, h: float) -> Outward | None:

@@ -6,7 +6,7 @@ cases the model of the scene computes each sample. Motion of a linear body is pr
 pressure, so that samples that differ only in pressure are solved once.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from typing import Any
@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simple_model import MovingPressure, named_lines, phasors, sensation_level
-from simple_model.layers.compliance import Compliance
+from simple_model import named_lines, phasors, sensation_level
 from simple_model.layers.flat_body import path_operator, steady_lines
 from simple_model.line_table import lines_in_pulses
 from simple_model.load.line_names import line_frequency
@@ -49,15 +48,11 @@ from skinwave.typing import Complex, Floats
 class Method:
     """How samples are solved.
 
-    Parameters
-    ----------
-    lines : names of the evaluated lines
-    options : SolveOptions of samples that the wavenumber integral does not solve
-    mapped : whether it solves them, with a map of a `step` in m
-    same_load : whether the loads of samples differ only in pressure
-    family : bodies that are reduced together, for the steady state
-    negligible_ratio : lines that are weaker than this, relative to the strongest line of the load,
-        are left out of wavenumber integrals
+    `lines` are the names of the evaluated lines. If `mapped`, the wavenumber integral solves the
+    samples, with a map of a `step` in m, and leaves out lines below `negligible_ratio` times the
+    strongest line of the load; otherwise a model does, with the `options`. If `same_load`, the
+    loads of samples differ only in pressure. Bodies of the `family` are reduced together, for the
+    steady state.
     """
 
     lines: tuple[str, ...]
@@ -333,19 +328,16 @@ def _steady_lines(scene: Scene, method: Method, together: bool) -> tuple[Floats,
 
 def _map_lines(scene: Scene, method: Method) -> tuple[Floats, Complex]:
     """Return the lines by the wavenumber integral at probes and map."""
-    places = np.stack(np.meshgrid(*method.map_axes(scene)), axis=-1).reshape(-1, 2)
-    points, waves = np.vstack([scene.probe_points, places]), compliance(scene.body)
+    grid_points = np.stack(np.meshgrid(*method.map_axes(scene)), axis=-1).reshape(-1, 2)
+    points, waves = np.vstack([scene.probe_points, grid_points]), compliance(scene.body)
     threshold = method.negligible_ratio
     if method.same_load:
-        return _operator(scene.pressure, tuple(map(tuple, points.tolist())), threshold)(waves)
+        places = tuple(map(tuple, points.tolist()))
+        return _cached_operator(scene.pressure, places, threshold=threshold)(waves)
     return steady_lines(waves, scene.pressure, points, threshold=threshold)
 
 
-@lru_cache(maxsize=2)
-def _operator(
-    pressure: MovingPressure, points: tuple[tuple[float, ...], ...], threshold: float
-) -> Callable[[Compliance], tuple[Floats, Complex]]:
-    return path_operator(pressure, points, threshold=threshold)
+_cached_operator = lru_cache(maxsize=2)(path_operator)
 
 
 def _compute(scene: Scene, method: Method) -> Solution:
