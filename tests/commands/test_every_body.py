@@ -7,7 +7,7 @@ from skinwave.bodies import KINDS
 from skinwave.commands.cli import main
 from skinwave.report.renderer import renderer
 from skinwave.results import playback
-from skinwave.studies import relax
+from skinwave.studies import assumptions
 
 SCENE = """
 [tacton]
@@ -56,7 +56,7 @@ def blocks(tmp_path_factory):
 def scene(blocks, monkeypatch, in_one_process, read_here):
     """The name of a scene's file with a body, in a folder with the meshes; few frames of films."""
     monkeypatch.chdir(blocks)
-    monkeypatch.setattr(relax, "can_be_alone", lambda *step: False)
+    monkeypatch.setattr(assumptions, "can_be_alone", lambda *step: False)
     monkeypatch.setattr(playback, "FRAMES", playback.Frames(fewest=4, most=4))
 
     def named(body):

@@ -4,7 +4,6 @@ import os
 import subprocess
 import sys
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -23,14 +22,6 @@ THREADS = ["--scheduler", "threads", "--quiet"]
 KERNEL = ["--model", "point-kernel"]
 SPEED, SIZE = "tacton.speed_m_per_s", "tacton.size_mm"
 OUT = Path("short-sweep")
-DYING = """
-import os
-def work(mark, item):  # the second item ends the process when it is first computed
-    if item == 1 and not mark.exists():
-        mark.touch()
-        os._exit(9)
-    return item
-"""
 
 
 def swept(*arguments):
@@ -131,15 +122,6 @@ def test_an_interrupted_sweep_resumes_without_lost_or_repeated_rows(scene, monke
     assert len({row[SPEED] for row in rows}) == len(rows) == 7
     parts = (OUT / "rows").glob("part-*.parquet")
     assert sum(pq.read_metadata(part).num_rows for part in parts) == 7
-
-
-def test_items_of_a_killed_worker_are_repeated(tmp_path, monkeypatch):
-    (tmp_path / "dying.py").write_text(DYING)
-    monkeypatch.syspath_prepend(tmp_path)
-    work = partial(import_module("dying").work, tmp_path / "died")
-    found = {}
-    engine.run_all(work, range(4), "processes", 1, found.update)
-    assert found == {k: k for k in range(4)}
 
 
 @pytest.fixture
