@@ -19,27 +19,53 @@ if TYPE_CHECKING:
     from skinwave.system.effort import Progress
 
 
+def add_options(parser: argparse.ArgumentParser, *shared: str) -> None:
+    """Add options that several commands have, by their names."""
+    options: dict[str, dict[str, Any]] = {
+        "scene": {"type": Path, "metavar": "SCENE", "help": "scene file (TOML)"},
+        "--unit": {
+            "default": "m", "help": "unit of the body's file: m (default), cm, mm, um or in",
+        },
+        "--up": {
+            "default": "+z", "metavar": "AXIS", "help": "axis of that file that points to the "
+            "device: +z (default), -z, +x, -x, +y or -y",
+        },
+        "--width": {
+            "type": float, "metavar": "INCH", "help": "width of every figure for print, such as "
+            "3.5 or 7 for a journal; letters are 8 points, names of lines 10 points, and their "
+            "subscripts 7 points",
+        },
+        "--model": {
+            "choices": ("auto", *names()), "default": "auto", "metavar": "MODEL",
+            "help": f"auto (default: the plan selects a model), {', '.join(names())}",
+        },
+        "--tolerance": {
+            "type": float, "default": 0.05, "metavar": "ERROR",
+            "help": "relative error that waveforms may have (default: 0.05)",
+        },
+        "--dt": {"type": float, "metavar": "S", "help": "time step of transient models in s"},
+        "--element-size": {
+            "dest": "h", "type": float, "metavar": "MM",
+            "help": "element size in mm (default: by the plan)",
+        },
+        "--solver": {"default": "auto", "help": "auto (default), pardiso or superlu"},
+        "--overwrite": {
+            "action": "store_true", "help": "replace an earlier result at this place",
+        },
+        "--quiet": {"action": "store_true", "help": "print no progress and no summary"},
+        "--json": {"action": "store_true", "help": "print the summary as JSON"},
+        "--debug": {"action": "store_true", "help": "print the traceback of an error"},
+    }  # fmt: skip
+    for name in shared:
+        parser.add_argument(name, **options[name])
+
+
 def add_output(
     parser: argparse.ArgumentParser, metavar: str = "DIR", what: str = "result folder"
 ) -> None:
     """Add options for where and how results are written."""
     parser.add_argument("-o", "--out", type=Path, metavar=metavar, help=what)
-    parser.add_argument(
-        "--overwrite", action="store_true", help="replace an earlier result at this place"
-    )
-    add_reporting(parser)
-
-
-def add_reporting(parser: argparse.ArgumentParser) -> None:
-    """Add options for what is printed."""
-    parser.add_argument("--quiet", action="store_true", help="print no progress and no summary")
-    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
-    parser.add_argument("--debug", action="store_true", help="print the traceback of an error")
-
-
-def add_scene(parser: argparse.ArgumentParser) -> None:
-    """Add the scene file."""
-    parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
+    add_options(parser, "--overwrite", "--quiet", "--json", "--debug")
 
 
 def add_scenes(parser: argparse.ArgumentParser, default: str) -> None:
@@ -48,58 +74,6 @@ def add_scenes(parser: argparse.ArgumentParser, default: str) -> None:
         "scenes", nargs="*", type=Path, metavar="SCENE",
         help=f"scene files (TOML) whose bodies and Tactons the page offers (default: {default})",
     )  # fmt: skip
-
-
-def add_file_frame(parser: argparse.ArgumentParser) -> None:
-    """Add unit and orientation of the coordinates in a body's file."""
-    parser.add_argument(
-        "--unit", default="m", help="unit of the body's file: m (default), cm, mm, um or in"
-    )
-    parser.add_argument(
-        "--up", default="+z", metavar="AXIS",
-        help="axis of that file that points to the device: +z (default), -z, +x, -x, +y or -y",
-    )  # fmt: skip
-
-
-def add_width(parser: argparse.ArgumentParser) -> None:
-    """Add the width of figures."""
-    parser.add_argument(
-        "--width", type=float, metavar="INCH",
-        help="width of every figure for print, such as 3.5 or 7 for a journal; letters are 8 "
-        "points, names of lines 10 points, and their subscripts 7 points",
-    )  # fmt: skip
-
-
-def add_mesh(parser: argparse.ArgumentParser) -> None:
-    """Add the options of finite elements: element size and direct solver."""
-    add_size(parser, help="element size in mm (default: by the plan)")
-    parser.add_argument("--solver", default="auto", help="auto (default), pardiso or superlu")
-
-
-def add_size(parser: argparse.ArgumentParser, **how: Any) -> None:
-    """Add the element size in mm."""
-    parser.add_argument("--element-size", dest="h", type=float, metavar="MM", **how)
-
-
-def add_model_name(parser: argparse.ArgumentParser) -> None:
-    """Add the name of the model."""
-    parser.add_argument(
-        "--model", choices=("auto", *names()), default="auto", metavar="MODEL",
-        help=f"auto (default: the plan selects a model), {', '.join(names())}",
-    )  # fmt: skip
-
-
-def add_model(parser: argparse.ArgumentParser, *, has_steps: bool = True) -> None:
-    """Add the options of the model: its name, its tolerance and its time step."""
-    add_model_name(parser)
-    parser.add_argument(
-        "--tolerance", type=float, default=0.05, metavar="ERROR",
-        help="relative error that waveforms may have (default: 0.05)",
-    )  # fmt: skip
-    if has_steps:
-        parser.add_argument(
-            "--dt", type=float, metavar="S", help="time step of transient models in s"
-        )
 
 
 def solve_options(options: argparse.Namespace, progress: "Progress") -> "SolveOptions":

@@ -24,7 +24,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--body", metavar="BODY", help="replace the body: paper-sheet, skin-slab, palm, or a file "
         "with the surface of a hand (stl, ply, obj, glb, vtp) or a mesh (vtu, msh, inp, vtk)",
     )  # fmt: skip
-    common.add_file_frame(parser)
+    common.add_options(parser, "--unit", "--up")
     add("--measured", type=Path, metavar="FILE", help="compare with this measurement of the scene")
     add(
         "--delay", type=float, metavar="MS",
@@ -34,8 +34,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--gain", type=float, metavar="G",
         help="gain of the record relative to the body (default: fitted)",
     )  # fmt: skip
-    common.add_model_name(parser)
-    common.add_mesh(parser)
+    common.add_options(parser, "--model", "--element-size", "--solver")
     common.add_output(parser)
 
 

@@ -4,7 +4,7 @@ import argparse
 from math import isfinite
 from pathlib import Path
 
-from skinwave.commands.common import add_reporting, metre, summarise
+from skinwave.commands.common import add_options, metre, summarise
 from skinwave.system.formats import PATTERN_READERS, PATTERN_WRITERS, suffixes
 from skinwave.system.plain_text import number_in
 
@@ -34,7 +34,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "autd3, 0.12 or later",
     )  # fmt: skip
     add("--overwrite", action="store_true", help="replace an existing file")
-    add_reporting(parser)
+    add_options(parser, "--quiet", "--json", "--debug")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -2,12 +2,12 @@
 
 import argparse
 
-from skinwave.commands.common import add_output, add_scene, result_folder, summarise_page
+from skinwave.commands.common import add_options, add_output, result_folder, summarise_page
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    add_scene(parser)
+    add_options(parser, "scene")
     parser.add_argument(
         "--highest", type=float, default=650.0, metavar="HZ",
         help="highest frequency in Hz (default: 650)",

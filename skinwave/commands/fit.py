@@ -38,7 +38,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--to", choices=("waveforms", "lines", "amplitudes"),
         help="data to fit: waveforms (default), complex lines, or amplitudes",
     )  # fmt: skip
-    common.add_model_name(parser)
+    common.add_options(parser, "--model")
     add("--starts", type=int, default=8, metavar="N", help="starts of the search (default: 8)")
     add("--seed", type=int, default=0, help="seed of the starts (default: 0)")
     add(

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_file_frame, add_output, add_size, progress_of, summarise
+from skinwave.commands.common import add_options, add_output, progress_of, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -13,7 +13,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "file", type=Path, metavar="FILE", help="surface (stl, ply, obj, off, glb, vtp) or mesh "
         "(vtu, msh, inp, vtk, vtkhdf, xdmf, med, bdf, mesh)",
     )  # fmt: skip
-    add_file_frame(parser)
+    add_options(parser, "--unit", "--up")
     add(
         "--inner", type=Path, action="append", default=[], metavar="FILE",
         help="closed surface inside the body, such as a bone, which becomes a region with the name "
@@ -28,7 +28,10 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="pieces to keep if the file has several: all (default) or the largest",
     )  # fmt: skip
     add("--cap", action="store_true", help="close plane holes, such as an open wrist")
-    add_size(parser, default=4.0, help="element size in mm (default: 4)")
+    add(
+        "--element-size", dest="h", type=float, default=4.0, metavar="MM",
+        help="element size in mm (default: 4)",
+    )  # fmt: skip
     add(
         "--timeout", type=float, default=600.0, metavar="S",
         help="time limit of the mesher in s (default: 600)",

@@ -7,10 +7,8 @@ from skinwave.commands import common
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    common.add_scene(parser)
-    common.add_model(parser)
-    common.add_mesh(parser)
-    common.add_reporting(parser)
+    model = ("--model", "--tolerance", "--dt", "--element-size", "--solver")
+    common.add_options(parser, "scene", *model, "--quiet", "--json", "--debug")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from skinwave.commands.common import (
     add_output,
-    add_size,
     metre,
     result_folder,
     summarise_page,
@@ -22,7 +21,10 @@ def options(parser: argparse.ArgumentParser) -> None:
         "scene", metavar="SCENE", help=f"scene file (TOML), or {BOTH}: which mechanism produces "
         "which line of the 15 Tactons",
     )  # fmt: skip
-    add_size(parser, help="element size of all steps in mm")
+    add(
+        "--element-size", dest="h", type=float, metavar="MM",
+        help="element size of all steps in mm",
+    )  # fmt: skip
     add(
         "--update-rate", type=float, default=20.0, metavar="KHZ",
         help="update rate of the device's focus: 20 (default) or 40 kHz",

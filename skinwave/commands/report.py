@@ -46,7 +46,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--beside", type=lambda text: text.split(","), default=[], metavar="BODIES",
         help="add these bodies: paper-sheet, skin-slab or palm, separated by commas",
     )  # fmt: skip
-    common.add_width(parser)
+    common.add_options(parser, "--width")
     add(
         "--only", type=lambda text: text.split(","), default=[], metavar="COLUMNS",
         help="show only these models, such as point-kernel,skin-slab",
@@ -63,7 +63,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--depth", metavar="MM",
         help="depth of a map in mm, or a receptor (default: that of the scene)",
     )  # fmt: skip
-    common.add_mesh(parser)
+    common.add_options(parser, "--element-size", "--solver")
     common.add_output(parser)
 
 

@@ -7,9 +7,8 @@ from skinwave.commands import common
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    common.add_scene(parser)
-    common.add_model(parser)
-    common.add_mesh(parser)
+    model = ("--model", "--tolerance", "--dt", "--element-size", "--solver")
+    common.add_options(parser, "scene", *model)
     parser.add_argument(
         "--samples", type=int, metavar="N",
         help="sample the uncertain numbers of the scene N times, for bands and percentiles",

@@ -50,8 +50,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--workers", type=int, metavar="N",
         help="number of runs at a time on this machine (default: all cores)",
     )  # fmt: skip
-    common.add_model(parser, has_steps=False)
-    common.add_mesh(parser)
+    common.add_options(parser, "--model", "--tolerance", "--element-size", "--solver")
     add("--csv", action="store_true", help="also write rows.csv")
     add(
         "--all-columns", action="store_true",
@@ -74,8 +73,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="format of figures (default: png)",
     )  # fmt: skip
     add("--style", default="report", help="report (default), talk or print")
-    common.add_width(parser)
-    common.add_reporting(parser)
+    common.add_options(parser, "--width", "--quiet", "--json", "--debug")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from skinwave.commands.common import add_reporting, add_scenes, progress_of, warn, with_failures
+from skinwave.commands.common import add_options, add_scenes, progress_of, warn, with_failures
 from skinwave.system.plain_text import say
 
 QUICK = ("skin-slab", "paper-sheet")  # bodies that are ready in seconds
@@ -23,7 +23,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="path of the page behind a proxy, such as /user/name/proxy/8080/",
     )  # fmt: skip
     add("--no-browser", action="store_true", help="only print the address")
-    add_reporting(parser)
+    add_options(parser, "--quiet", "--json", "--debug")
 
 
 def run(options: argparse.Namespace) -> int:
