@@ -107,10 +107,11 @@ def warn(sentences: Iterable[str]) -> None:
 
 
 def note_scenes(options: argparse.Namespace) -> None:
-    """Warn of implausible numbers in the scenes of a command, unless the warnings of its responses
-    do, and print notes on the map of a focus, and on spreads that it ignores.
+    """Warn of implausible numbers in the scenes of a command, and print notes on the map of a focus
+    and on distributions that the command ignores.
 
-    The command itself refuses a file that cannot be read.
+    Commands whose responses have these warnings get notes only. Each command itself refuses a file
+    that cannot be read.
     """
     name = options.command_name
     has_own_warnings = name in ("plan", "run")

@@ -162,8 +162,8 @@ def _scene(options: argparse.Namespace) -> "Scene":
 def _views(
     options: argparse.Namespace, progress: "Progress"
 ) -> "tuple[list[View], dict[str, str]]":
-    """Return the saved motion of a result folder, or compute that of every model of a scene; with
-    the models that failed.
+    """Return the saved views of a result folder, or compute those of all models of a scene; also
+    return the models that failed.
     """
     from skinwave.studies.album import open_album, quantity_views
 

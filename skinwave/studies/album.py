@@ -68,7 +68,7 @@ class Album:
 
 
 def scene_columns(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
-    """Return scenes by `Run.column`: of both point kernels, of its own body and of other presets.
+    """Return scenes by `Run.column`: both point kernels, the scene's own body and other presets.
 
     A scene without a body is computed on the bodies of `paper15.MEASURED_ON` that its path and
     probes fit. All but the published kernel receive the same load. Raises a ValueError if the load

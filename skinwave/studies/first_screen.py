@@ -113,11 +113,11 @@ def _added(groups: Mapping[str, Sequence[Run]]) -> dict[str, list[str]]:
     """Return the lines that nonlinear bodies add to those of their load, by column."""
     added: dict[str, list[str]] = {}
     for group in groups.values():
-        kernel = _run_of(group, SAME_LOAD.name)
-        for run in group if kernel else ():
-            if kernel and run.is_motion and named(run.model).is_nonlinear:
-                lines = added.setdefault(run.column, [])
-                lines += [name for name in added_lines(run, kernel) if name not in lines]
+        if kernel := _run_of(group, SAME_LOAD.name):
+            for run in group:
+                if run.is_motion and named(run.model).is_nonlinear:
+                    lines = added.setdefault(run.column, [])
+                    lines += [name for name in added_lines(run, kernel) if name not in lines]
     return added
 
 

@@ -64,11 +64,12 @@ def paper_vs_skin(
     ratios: dict[str, tuple[float, ...]] = {}
     failures: dict[str, str] = {}
     for body_name, body in bodies.items():
-        mechanisms: Mapping[str, Settled] = {}
+        mechanisms: list[Mechanism] = []
         with or_failed(failures, label(body_name)):
             mechanisms = _mechanisms(body, h, progress)
-        for cause, settled in mechanisms.items():
+        for cause, drive, solve in mechanisms:
             mechanism = f"{label(body_name)}: {cause}"
+            settled = partial(_steady_half, solve, body, drive)
             for k, (name, tacton) in enumerate(chosen):
                 progress(mechanism, k / (len(chosen) + 1))
                 with or_failed(failures, f"{name} on {mechanism}"):
@@ -83,28 +84,20 @@ def paper_vs_skin(
     return Findings(levels=levels, ratios=ratios, amplitudes=amplitudes, failures=failures)
 
 
-Settled = Callable[[Tacton], tuple[MovingPressure, Response]]
+Mechanism = tuple[str, str, Callable[[Scene], Response]]  # its name, its drive, and its model
 
 
-def _mechanisms(body: Body, h: float | None, progress: Progress) -> Mapping[str, Settled]:
-    """Return, for each mechanism, a function that computes a Tacton's settled response."""
-
-    def by(solve: Callable[[Scene], Response], drive: str) -> Settled:
-        return partial(_steady_half, solve, body, drive)
-
-    if not body.of_kind.is_plate:
+def _mechanisms(body: Body, h: float | None, progress: Progress) -> list[Mechanism]:
+    """Return the mechanisms that may cause lines on a body."""
+    others: list[Mechanism] = []
+    if body.of_kind.is_plate:
+        linear, stretching = (partial(compute, model=m.name) for m in (FROM_REST, STRETCHED))
+        others = [("squared load, stretching", "pressure_squared", stretching)]
+    else:
         still = Scene(pressure=STILL, body=body)
         linear = partial(answer, reduce_scene(still, SolveOptions(h=h, progress=progress)))
-        return {
-            "linear load": by(linear, "linear"),
-            "squared load": by(linear, "pressure_squared"),
-        }
-    bending, stretching = (partial(compute, model=each.name) for each in (FROM_REST, STRETCHED))
-    return {
-        "linear load": by(bending, "linear"),
-        "squared load": by(bending, "pressure_squared"),
-        "squared load, stretching": by(stretching, "pressure_squared"),
-    }
+    squared = ("squared load", "pressure_squared", linear)
+    return [("linear load", "linear", linear), squared, *others]
 
 
 def _steady_half(
