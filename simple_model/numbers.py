@@ -46,9 +46,11 @@ def with_error(value: float, error: float, digits: int = 3) -> str:
 
 
 def interval(low: float, high: float, digits: int = 2) -> str:
-    """Format a range with an en dash, or as "-5 to 25" if a number is negative."""
+    """Format a range with an en dash, or as "-5 to 25" if a number is negative. Ends that are equal
+    to these digits become one number.
+    """
     between = EN_DASH if min(low, high) >= 0 else " to "
-    return between.join(significant(end, digits) for end in (low, high))
+    return between.join(dict.fromkeys(significant(end, digits) for end in (low, high)))
 
 
 def decibel(value: float, *, signed: bool = False) -> str:

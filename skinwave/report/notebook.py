@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simple_model import drawing
-from simple_model.numbers import interval, percent, plural
+from simple_model.numbers import interval, plural
 from skinwave.report.description import scene_rows
 from skinwave.typing import Floats
 
@@ -76,9 +76,7 @@ def _cost(plan: "Plan") -> str:
 
 
 def _range(misfit: Floats) -> str:
-    low, high = (100 * float(end) for end in (misfit.min(), misfit.max()))
-    is_one = percent(low / 100) == percent(high / 100)
-    return percent(low / 100) if is_one else f"{interval(low, high)} %"
+    return f"{interval(100 * float(misfit.min()), 100 * float(misfit.max()))} %"
 
 
 def scene_page(scene: "Scene") -> str:

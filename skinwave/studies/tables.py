@@ -196,9 +196,7 @@ def _range(values: Floats) -> str:
         return "-"
     round_off = 1e-3  # ms, or of a misfit
     values = np.where(np.abs(values) < round_off, 0.0, values) + 0.0
-    low, high = float(values.min()), float(values.max())
-    is_one = significant(low, 2) == significant(high, 2)
-    return significant(low, 2) if is_one else interval(low, high)
+    return interval(float(values.min()), float(values.max()))
 
 
 def effort_table(
