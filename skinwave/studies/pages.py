@@ -67,6 +67,10 @@ class Gallery:
     at_rest: "Future[Any] | None" = None
     side_by_side: "Future[Any] | None" = None
 
+    def begin(self, draw: Callable[..., Any], *given: Any) -> Callable[[], Any]:
+        """Begin to draw in a process, if there is one; return a function of the result."""
+        return self.workers.submit(draw, *given).result if self.workers else partial(draw, *given)
+
     def figure(self, name: str, figure: Figure, caption: str) -> Picture:
         """Return a figure with its files."""
         kinds = ("png", *self.formats)
@@ -170,10 +174,8 @@ def _begin_pictures(runs: Sequence[Run], gallery: Gallery) -> "dict[Run, Callabl
     meshed = [run for run in runs if named(run.model).default_size]
     if gallery.at_rest:
         return dict.fromkeys(meshed, gallery.at_rest.result)
-    if gallery.workers and renderer().is_available:
-        workers, style = gallery.workers, gallery.style
-        return {run: workers.submit(_body_picture, run.scene, style).result for run in meshed}
-    return {run: partial(_body_picture, run.scene, gallery.style) for run in meshed}
+    begin = gallery.begin if renderer().is_available else partial  # which begins nothing
+    return {run: begin(_body_picture, run.scene, gallery.style) for run in meshed}
 
 
 def begin_gallery(

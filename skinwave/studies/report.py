@@ -100,16 +100,14 @@ def picture_parts(album: Album, gallery: Gallery) -> list[Part]:
     own = (of_scene or views)[-1]
     options: dict[str, Part] = {}
     missing: list[Part] = []
-    draw_film: Callable[[], Picture] | None = None
-    if not renderer().is_available:
-        missing = [f"Three-dimensional pictures and the film are left out: {renderer().detail}."]
-    else:
-        if gallery.workers:  # copies, because a view keeps what it computes while a thread sends it
-            copies = replace(own), [replace(view) for view in views]
-            draw_film = gallery.workers.submit(_film, *copies, gallery.style, silent).result
-        else:
-            draw_film = partial(_film, own, views, gallery.style, gallery.progress)
+    drawn_film: Callable[[], Picture] | None = None
+    if renderer().is_available:
+        # Copies, because a view keeps what it computes while a thread sends it.
+        copies = replace(own), [replace(view) for view in views]
+        drawn_film = gallery.begin(_film, *copies, gallery.style)
         options = _spatial_parts(own, views, gallery)
+    else:
+        missing = [f"Three-dimensional pictures and the film are left out: {renderer().detail}."]
     gallery.progress("draw snapshots", 0.0)
     figure = maps.snapshots_figure(views, gallery.style)
     snapshots = (
@@ -120,10 +118,10 @@ def picture_parts(album: Album, gallery: Gallery) -> list[Part]:
     )
     options["snapshots"] = gallery.figure("snapshots", figure, snapshots)
     gallery.progress("draw snapshots", 0.5)
-    if draw_film:
+    if drawn_film:
         gallery.progress("film", 0.0)
         with or_failed(gallery.failures, "film"):
-            options["film"] = draw_film()
+            options["film"] = drawn_film()
     turned_caption = (
         "Turn it with the mouse, a finger or the arrow keys. Colour: motion about its mean, red "
         "into the body, blue out of it. If the legend has ≥, larger values have the end colour. "
@@ -157,7 +155,7 @@ def _spatial_parts(own: View, views: Sequence[View], gallery: Gallery) -> dict[s
     return parts
 
 
-def _film(own: View, views: Sequence[View], style: Style, progress: Progress) -> Picture:
+def _film(own: View, views: Sequence[View], style: Style) -> Picture:
     """Return the film as GIF; the page shows WebP if possible, a third of its size."""
     count = len(own.times)
     slower = significant(duration(count) / own.period, 2)
@@ -165,7 +163,7 @@ def _film(own: View, views: Sequence[View], style: Style, progress: Progress) ->
     film_panel = (352, 304)  # pixels of a model in the film of a page
     with TemporaryDirectory() as folder:
         path = Path(folder, "film.gif")
-        film(path, views, style, progress, panel=film_panel)
+        film(path, views, style, silent, panel=film_panel)
         gif = path.read_bytes()
     if not features.check("webp"):
         return Picture(gif, caption, "film", "gif")
