@@ -427,7 +427,7 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
         Column("waveform_percent", "change of the waveform", "%", 2), Column("at_mm", "at", "mm"),
         Column("level_db", "change of the sensation level", "dB", 2),
         Column("reach_with_mm", "reach above threshold with it", "mm"),
-        Column("reach_without_mm", "without it", "mm"),
+        Column("reach_without_mm", "reach without it", "mm"),
         Column("alone_percent", "change if no other assumption is made", "%", 2),
         Column("costs_s", "extra time", "s", 2), Column("line", "largest change of a line"),
         "lines_db",

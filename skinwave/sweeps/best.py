@@ -154,19 +154,16 @@ def find_best(
             f"only {len(bests)} of {n} samples have a number in column '{column}'; narrow their "
             "distributions or choose another column"
         )
-    ends = np.percentile(bests, (2.5, 97.5), axis=0, method="weibull").T
-    intervals = [  # with the accuracy of a best value
-        np.clip(each + [-margin, margin], *best.limits).tolist()
-        for best, each in zip(found, ends, strict=True)
-        for margin in [ACCURACY * np.diff(np.unique(levels[best.key])).max()]
-    ]
-    return tuple(
-        replace(
+    with_intervals = []
+    for best, drawn in zip(found, bests.T, strict=True):
+        margin = ACCURACY * np.diff(np.unique(levels[best.key])).max()
+        ends = np.percentile(drawn, (2.5, 97.5), method="weibull") + [-margin, margin]
+        low, high = np.clip(ends, *best.limits).tolist()
+        with_intervals.append(replace(
             best, interval=(low, high), samples=len(bests), failed=n - len(bests),
             uncertain=tuple(each.key for each in spreads), drawn=tuple(drawn.tolist()),
-        )
-        for best, (low, high), drawn in zip(found, intervals, bests.T, strict=True)
-    )  # fmt: skip
+        ))  # fmt: skip
+    return tuple(with_intervals)
 
 
 def _column(sweep: Sweep, column: str, combined: Combinations) -> Floats:
