@@ -238,6 +238,7 @@ def test_a_step_after_a_failed_one_has_no_effect():
 def pretend(monkeypatch, names, step):
     """Other assumptions, and other scenes and models without them."""
     monkeypatch.setattr(assumptions, "droppable", lambda scene: names)
+    monkeypatch.setattr(assumptions, "side_step", lambda scene: ())
     monkeypatch.setattr(
         assumptions, "without", lambda scene, dropped, **device: step(scene, dropped)
     )
@@ -263,7 +264,6 @@ def test_a_failed_step_comes_before_the_ranking(tmp_path, monkeypatch, capsys):
         return scene, "point-kernel" if dropped else "point-kernel-published"
 
     pretend(monkeypatch, ("linear drive", "sinc^2 profile", "main lobe only"), step)
-    monkeypatch.setattr(assumptions, "side_step", lambda scene: ())
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(dumps(SKIN))
     assert main(["relax", "scene.toml"]) == 1
