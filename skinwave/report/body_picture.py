@@ -31,12 +31,9 @@ from skinwave.scene.scene import Scene
 from skinwave.system.effort import Clock, silent
 from skinwave.typing import Array, Floats, Ints
 
-FREE, CLAMPED, SIMPLE, SPRINGS, ABSORBING = (
-    "free", "clamped", "simply supported", "on springs", "absorbing"
-)  # fmt: skip
-BOUNDARY = {
-    FREE: "#e3e6e8", CLAMPED: "#4a4f55", SIMPLE: "#8c6bb1", SPRINGS: "#5fae8f",
-    ABSORBING: "#7db8dc",
+BOUNDARY = {  # colours of boundary conditions
+    "free": "#e3e6e8", "clamped": "#4a4f55", "simply supported": "#8c6bb1",
+    "on springs": "#5fae8f", "absorbing": "#7db8dc",
 }  # fmt: skip
 REGIONS = ("#e8a48c", "#f3d7a2", "#c9705f", "#f6f1e0", "#b88fa8", "#a9a05f", "#d9c2d0")
 FAR = 1e4  # mm, outside all bodies
@@ -44,10 +41,17 @@ FAR = 1e4  # mm, outside all bodies
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshedBody:
-    """What is drawn of a meshed body: its points (n, 3) in mm, the tetrahedra (m, 10) outside the
-    absorbing layer with their regions (m,), the facets (k, 6) on their boundary with the name of
-    the condition of each and its share (k,), the upper facets (j, 6), names of regions, and names
-    and thicknesses in mm of the layers of the coat.
+    """What is drawn of a meshed body.
+
+    Parameters
+    ----------
+    points : (n, 3) float, mm
+    tets, region : (m, 10) and (m,) int, tetrahedra outside the absorbing layer, and their regions
+    facets : (k, 6) int, on their boundary; conditions, shares : (k,), boundary condition of each
+        facet, and its share there
+    top : (j, 6) int, upper facets
+    names : of regions
+    coat : names and thicknesses in mm of the layers of the coat
     """
 
     points: Floats
@@ -67,9 +71,9 @@ class MeshedBody:
 
     @property
     def corner(self) -> Floats:
-        """Place (2,) where it is cut open: the origin, or the middle of a body beside it."""
-        low, high = self.points[:, :2].min(axis=0), self.points[:, :2].max(axis=0)
-        return np.zeros(2) if len(self.on_top(np.zeros((1, 2)))) else (low + high) / 2
+        """Place (2,) where it is cut open: the origin or, if that is beside it, its middle."""
+        ends = self.points[:, :2].min(axis=0), self.points[:, :2].max(axis=0)
+        return np.zeros(2) if len(self.on_top(np.zeros((1, 2)))) else np.mean(ends, axis=0)
 
     @property
     def colours(self) -> dict[str, str]:
@@ -79,20 +83,17 @@ class MeshedBody:
         return {name: REGIONS[k % len(REGIONS)] for k, name in enumerate(names)}
 
     def on_top(self, places: Floats) -> Floats:
-        """Return the points (q, 3) of the upper surface at those of some places (p, 2) in mm that
-        are on it.
-        """
+        """Return the points (q, 3) of the upper surface at those places (p, 2) in mm on it."""
         top = on_triangles(self.points, split(self.top), 0.9999 * places)
         height = top(self.points[:, 2])
         return np.column_stack([places, height])[np.isfinite(height)]
 
 
-def drawn_size(body: Body) -> float:
-    """Return the element size in m of the picture of a body."""
+def drawn_size(body: Body, coarser: float = 1.5) -> float:
+    """Return the element size in m of the picture of a body: up to `coarser` times the default."""
     usual = default_size(body)
     if body.file:  # filling a surface takes long, and meshes of the default size are cached
         return usual
-    coarser = 1.5  # element size of the picture over the default one
     return min(coarser * usual, max(coarsest_size(body), usual))
 
 
@@ -119,33 +120,32 @@ def _conditions(body: Body, build: Build, facets: Ints) -> tuple[Array, Floats]:
     """Return the name (k,) of the condition of each facet, and its share (k,) there."""
     mesh, count = build.mesh, len(build.mesh.points)
     keys = facet_keys(facets, count)
-    found, shares = np.full(len(facets), FREE, dtype=object), np.ones(len(facets))
+    found, shares = np.full(len(facets), "free", dtype=object), np.ones(len(facets))
 
     def mark(name: str, others: Ints, share: Floats | float = 1.0) -> None:
         _, own, other = np.intersect1d(keys, facet_keys(others, count), return_indices=True)
         found[own], shares[own] = name, np.broadcast_to(share, len(others))[other]
 
     if build.drag is not None:
-        found[:] = ABSORBING
-        mark(FREE, boundary_facets(mesh.tets))
+        found[:] = "absorbing"
+        mark("free", boundary_facets(mesh.tets))
     if build.absorbing is not None:
-        mark(ABSORBING, build.absorbing)
+        mark("absorbing", build.absorbing)
     if (support := build.support) is not None:
         held = supported_share(-facet_normals(mesh, support.facets)[:, 2]) * (support.stiffness > 0)
         springs, dashpots = (
             each.reshape(len(support.facets), -1).mean(axis=1) for each in (held, support.absorbed)
         )
-        held_by = SPRINGS if body.base == "elastic" else CLAMPED  # by soft tissue over bone
-        for name, share in ((held_by, springs), (ABSORBING, dashpots)):
+        held_by = "on springs" if body.base == "elastic" else "clamped"  # by soft tissue over bone
+        for name, share in ((held_by, springs), ("absorbing", dashpots)):
             acts = (share > 0) & (share == np.maximum(springs, dashpots))
             mark(name, support.facets[acts], share[acts])
     for name, components in build.fixed.items():
         if components == "xyz":
-            mark(CLAMPED, mesh.facets[name])
+            mark("clamped", mesh.facets[name])
     if build.held is not None:
-        simply = body.mounting.support == "simply"
         at_rest = np.asarray(build.held.any(axis=1))[facets[:, :3]].all(axis=1)
-        found[at_rest] = SIMPLE if simply else CLAMPED
+        found[at_rest] = "simply supported" if body.mounting.support == "simply" else "clamped"
     return found, shares
 
 
@@ -156,14 +156,13 @@ def body_picture(scene: Scene, style: Style = REPORT) -> render.Image:
     Raises the errors of `bodies.build.build`, or a ValueError if the body cannot be meshed.
     """
     drawn = meshed_body(scene.body)
-    page_width, height, row = 7.0, 3.6, 0.24  # inch: of the picture, and of a row of its legend
-    inch = style.size(page_width, height)[0] if style.columns else page_width
-    width = render.pixels(style, inch)
-    image = _render(drawn, scene, style, (width, round(width * height / page_width)), inch)
+    page, height, row = style.page, 3.6, 0.24  # inch: of the picture, and of a row of its legend
+    inch = style.size(page, height)[0] if style.columns else page
+    width = style.pixels(inch)
+    image = _render(drawn, scene, style, (width, round(width * height / page)), inch)
     entries = _entries(drawn, scene)
-    most_columns, narrow_columns = 4, 2  # of the legend
-    columns = most_columns if inch > page_width / 2 + 1 else narrow_columns
-    with mpl.rc_context({**style.rc, "font.size": render.LETTERS}):
+    columns = 4 if inch > page / 2 + 1 else 2  # of the legend
+    with mpl.rc_context({**style.rc, "font.size": style.solid_font}):
         figure = Figure(figsize=(inch, row * (-(-len(entries) // columns) + 1)))
         legend(figure, entries, columns, loc="center", fontsize=None, frameon=False)
         return np.vstack([image, render.raster(figure, width / inch)])
@@ -178,9 +177,10 @@ def _entries(drawn: MeshedBody, scene: Scene) -> dict[str, dict[str, Any]]:
         name: {**edge, "marker": "s", "ms": 8, "mfc": shade} for name, shade in patches.items()
     }
     if not scene.tacton.trajectory.is_static:
-        entries["path of the focus"] = {"color": render.PATH, "lw": 1.5}
-    entries["focus at the start"] = {**edge, "marker": "o", "mfc": render.FOCUS, "ms": 8}
-    entries["probes"] = {**edge, "marker": "o", "mfc": render.PROBE, "ms": 6}
+        entries["path of the focus"] = {"color": render.MARKS["path"], "lw": 1.5}
+    ball = edge | {"marker": "o"}
+    entries["focus at the start"] = {**ball, "mfc": render.MARKS["focus"], "ms": 8}
+    entries["probes"] = {**ball, "mfc": render.MARKS["probes"], "ms": 6}
     return entries
 
 
@@ -190,38 +190,33 @@ def _render(
     """Return the picture of a size in pixels without its legend."""
     import pyvista as pv
 
-    letter, is_plate = render.LETTERS / 72 * size[0] / inch, scene.body.of_kind.is_plate
-    side = float(np.ptp(drawn.points, axis=0).max())
+    letter, side = style.letter(size[0], inch), float(np.ptp(drawn.points, axis=0).max())
     below = drawn.on_top(drawn.corner[None])
     top = (below if len(below) else drawn.points)[:, 2].max()
-    gap, plate = 0.05, 0.02
+    # Over the largest side of the body: the gap below the arrow to the device, the length of that
+    # arrow, and the thickness of the support that is drawn below the body.
+    gap, arrow_size, plate = 0.05, 0.16, 0.02
     foot = np.array([*drawn.corner, top + gap * side])
-    # Lengths over the largest side of the body: the arrow to the device, the gap below it, and the
-    # thickness of the support that is drawn below the body.
-    arrow_size = 0.16
     tip = foot + [0.0, 0.0, arrow_size * side]
-    camera = (0.55, -1.0, 0.7)  # direction to the camera
-    edge = "#5a5f66"  # colour of the edges of elements
     steep = -0.7  # vertical component of the normal of a base, at most
-    enlargement = 2  # of lines and balls, which are drawn smaller
     lit: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.6}
     with render.new_plotter(style, size) as plotter:
-        plotter.enable_anti_aliasing("ssaa")  # draws at `enlargement` times the size
+        plotter.enable_anti_aliasing("ssaa")
         skin = pv.PolyData.from_regular_faces(drawn.points, split(drawn.facets))
         shades = np.array([to_rgb(BOUNDARY[name]) for name in drawn.conditions])
-        free = np.array(to_rgb(BOUNDARY[FREE]))
+        free = np.array(to_rgb(BOUNDARY["free"]))
         skin["shade"] = np.repeat(free + drawn.shares[:, None] * (shades - free), 4, axis=0)
         skin = _opened(skin, drawn).extract_surface(algorithm="dataset_surface")
-        skin = skin.compute_normals(feature_angle=render.SHARP, split_vertices=True)
+        skin = render.with_normals(skin)
         skin = skin.cell_data_to_point_data()  # colours change abruptly at sharp edges only
         plotter.add_mesh(skin, scalars="shade", rgb=True, smooth_shading=True, **lit)
         edges = _opened(_edges(drawn, drawn.facets), drawn)
-        plotter.add_mesh(edges, color=edge, opacity=0.2, line_width=letter / 12)
-        for name in set(drawn.conditions) - {FREE}:
+        plotter.add_mesh(edges, color="#5a5f66", opacity=0.2, line_width=letter / 12)
+        for name in set(drawn.conditions) - {"free"}:
             held = drawn.conditions == name
             mark = pv.PolyData.from_regular_faces(drawn.points, split(drawn.facets[held]))
             base = mark.face_normals[:, 2] < steep
-            if is_plate:  # its sides are too thin to see
+            if scene.body.of_kind.is_plate:  # its sides are too thin to see
                 mark = _edges(drawn, drawn.facets[held])
             elif base.any():
                 mark = mark.extract_cells(base).extract_surface(algorithm="dataset_surface")
@@ -237,7 +232,8 @@ def _render(
         )
         marks = [pv.lines_from_points(path)] if len(path) > 1 else []
         marks += [pv.PolyData(probes)] if len(probes) else []
-        render.add_marks(plotter, marks, pv.PolyData(path[:1] + lift), enlargement * letter)
+        # Anti-aliasing draws at twice the size, and lines and balls half as large.
+        render.add_marks(plotter, marks, pv.PolyData(path[:1] + lift), 2 * letter)
         arrow = pv.Arrow(
             start=foot, direction=tip - foot, scale="auto", shaft_radius=0.03, tip_radius=0.09
         )
@@ -250,7 +246,7 @@ def _render(
         height = 1.3 * (1 + title.count("\n")) * letter / size[1]
         render.write(plotter, title, (0.01, 0.98 - height), letter, style.ink)
         shown = np.vstack([drawn.points, [foot, tip], render.scale_bar(drawn.points)])
-        render.Projection.of(camera, shown, size[0] / size[1]).apply(plotter)
+        render.set_camera(plotter, (0.55, -1.0, 0.7), shown, size[0] / size[1])
         return np.asarray(plotter.screenshot(None, return_img=True))
 
 

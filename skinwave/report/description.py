@@ -17,10 +17,9 @@ from skinwave.scene.scene import Body, Scene
 
 def _spot(pressure: MovingPressure) -> str:
     spots = {
-        "gaussian": "Gaussian focus",
-        "main_lobe": "focus S = sinc²(D/D₀)",
+        "gaussian": "Gaussian focus", "main_lobe": "focus S = sinc²(D/D₀)",
         "array": "whole field of the array",
-    }
+    }  # fmt: skip
     return focus_note(pressure) or spots.get(pressure.profile_name, "custom focal spot")
 
 
@@ -33,19 +32,17 @@ def model_paragraphs(runs: Sequence[Run]) -> list[str]:
     notes = dict.fromkeys(run.scene.pressure.law.note for run in on_bodies if run.is_am)
     by_device = any(run.scene.load.of_kind.is_of_device for run in on_bodies)
     uncertain = (
-        "The pressure at the focus, and therefore every displacement, is known only to a factor "
-        "of 2."
+        "The pressure at the focus, and so every displacement, is known only within a factor of 2."
     )
     return [*map(_model_text, groups.values()), *filter(None, notes), *[uncertain] * by_device]
 
 
-def unresolved_lines(runs: Iterable[Run]) -> list[str]:
-    """Return a sentence about unresolved lines for each duration of a Tacton."""
+def unresolved_lines(runs: Iterable[Run], most: int = 4) -> list[str]:
+    """Return a sentence about unresolved lines for each duration of a Tacton; it names a few."""
     unresolved = {run.scene.tacton.duration: run.unresolved for run in runs if run.unresolved}
-    named = 4  # lines that a sentence names
     return [
         f"A Tacton of {seconds:g} s is too short to resolve {plural(len(names), 'line')}: "
-        f"{', '.join(names[:named])}{' and others' * (len(names) > named)}. Use a longer Tacton."
+        f"{', '.join(names[:most])}{' and others' * (len(names) > most)}. Use a longer Tacton."
         for seconds, names in unresolved.items()
     ]
 
@@ -78,20 +75,16 @@ def _sheet_text(runs: list[Run]) -> str:
         sentences.append(
             "The mesh is a thicker sheet of the same bending stiffness and mass per area."
         )
-    if body.air:
-        sentences.append(
-            "Air on both sides moves with the sheet, and takes energy by friction and sound; "
-            + (
-                "it flows around the edges."
-                if body.air == "free"
-                else "a wall around the sheet separates both sides."
-            )
-        )
-    else:
-        sentences.append(
-            "Left out: the air that moves with the sheet, which has a fifth to a third of the mass "
-            "of office paper."
-        )
+    around = (
+        "it flows around the edges" if body.air == "free"
+        else "a wall around the sheet separates both sides"
+    )  # fmt: skip
+    sentences.append(
+        "Air on both sides moves with the sheet, and takes energy by friction and sound; "
+        f"{around}." if body.air else
+        "Left out: the air that moves with the sheet, which has a fifth to a third of the mass "
+        "of office paper."
+    )  # fmt: skip
     if not model.is_nonlinear and all(run.is_motion for run in runs):
         sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / body.depth
         sentences.append(
@@ -177,26 +170,23 @@ def material_text(solid: Material | str) -> str:
     """Describe a material by its constants or its name."""
     if isinstance(solid, str):
         return solid
-    text = f"density {solid.density:g} kg/m³, "
+    parts = [f"density {solid.density:g} kg/m³"]
     if (along := solid.orthotropy) is None:
-        text += f"shear modulus {solid.shear_modulus / 1e3:.4g} kPa, "
-        text += f"Poisson's ratio {solid.poisson:g}, "
+        parts += [f"shear modulus {solid.shear_modulus / 1e3:.4g} kPa"]
+        parts += [f"Poisson's ratio {solid.poisson:g}"]
     else:
-        text += (
-            f"Young's moduli {along.young_x / 1e9:.3g} and {along.young_y / 1e9:.3g} GPa along x "
-            f"and y, shear modulus {along.plane_stress[2, 2] / 1e9:.3g} GPa, Poisson's ratio "
-            f"{along.poisson_xy:g}, "
-        )
+        young = f"{along.young_x / 1e9:.3g} and {along.young_y / 1e9:.3g} GPa along x and y"
+        shear = f"shear modulus {along.plane_stress[2, 2] / 1e9:.3g} GPa"
+        parts += [f"Young's moduli {young}", shear, f"Poisson's ratio {along.poisson_xy:g}"]
     if solid.law is not None:
-        return text + getattr(solid.law, "words", "custom complex modulus")
-    losses = [f"viscosity {solid.viscosity:g} Pa s"] * bool(
-        solid.viscosity or not solid.loss_factor
-    )
-    text += ", ".join([*losses, *[f"loss factor {solid.loss_factor:g}"] * bool(solid.loss_factor)])
+        return ", ".join([*parts, getattr(solid.law, "words", "custom complex modulus")])
+    is_lossy = bool(solid.loss_factor)
+    parts += [f"viscosity {solid.viscosity:g} Pa s"] * bool(solid.viscosity or not is_lossy)
+    parts += [f"loss factor {solid.loss_factor:g}"] * is_lossy
     for term in solid.prony:
-        text += f", Maxwell branch of {term.modulus / 1e3:.4g} kPa with relaxation time "
-        text += f"{1e3 * term.time:g} ms"
-    return text
+        branch = f"Maxwell branch of {term.modulus / 1e3:.4g} kPa"
+        parts.append(f"{branch} with relaxation time {1e3 * term.time:g} ms")
+    return ", ".join(parts)
 
 
 def scene_rows(scene: Scene) -> list[list[str]]:
@@ -230,7 +220,7 @@ def quantity_notes(scene: Scene) -> list[str]:
         return []
     return [
         f"Probes read {scene.reading.words}, in {scene.reading.record.shown}, but "
-        f"{no_kernel_text(scene)}. Its columns are in Pa, and it has no value of that quantity in "
-        "lines.csv. Pictures of the surface show its motion, except for maps of the quantity. "
-        "Claims and sensation levels, which need displacement, are left out for bodies."
+        f"{no_kernel_text(scene)}. The columns of the kernel are in Pa, and lines.csv has none of "
+        "its values in that quantity. Pictures show the motion of the surface, except for maps of "
+        "the quantity. Bodies have no claims and sensation levels, which need displacement."
     ]

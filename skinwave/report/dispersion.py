@@ -39,7 +39,7 @@ def dispersion_figure(
     size = style.size(11.5 if thick else 8.5, 8.4)
     figure = Figure(figsize=size, layout="constrained")
     left: Figure | SubFigure = figure
-    share = 0.68  # of a figure's width for the curves, if the shapes are drawn too
+    share = 0.68 if thick else 1.0  # of the width for the curves; the shapes have the rest
     if thick:
         left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(share, 1 - share))[0]
         _shapes(right, curves, at)
@@ -56,9 +56,7 @@ def dispersion_figure(
         for frequency in lines.values():
             ax.axvline(frequency, **LINE_STYLE)
         ax.grid(alpha=0.25)
-    width = 72 * size[0] * (share if thick else 1) - 8 * style.font  # points
-    name_rows = 3  # of names of lines above the panels
-    name_lines(axes[0], lines, width, name_rows)
+    name_lines(axes[0], lines, 72 * size[0] * share - 8 * style.font, rows=3)
     axes[-1].set_xlabel("frequency, Hz")
     ink = mpl.rcParams["text.color"]
     entries: dict[str, dict[str, Any]] = {
@@ -74,18 +72,15 @@ def _draw_curves(axes: Sequence[Axes], curves: DispersionCurves, focus_speed: fl
     """Draw speed, length and group speed of each mode; evanescent parts are pale."""
     speeds, groups, longest = [focus_speed], [1.0], 10.0
     drawn = []
-    fine_count = 600  # frequencies of a drawn curve
     for n, mode in enumerate(curves.modes):
-        fine = np.linspace(mode.frequencies[0], mode.frequencies[-1], fine_count)
+        fine = np.linspace(mode.frequencies[0], mode.frequencies[-1], 600)
         nearest = np.abs(fine[:, None] - mode.frequencies).argmin(axis=1)
         wave = mode.is_wave[nearest] & (fine >= mode.cut_on)
         wavenumber = np.sqrt(mode.squared_at(fine))
         slowness = np.gradient(wavenumber.real, 2 * np.pi * fine)
         with np.errstate(divide="ignore", invalid="ignore"):
-            speed, length = (
-                2 * np.pi * fine / np.abs(wavenumber.real),
-                1e3 / np.abs(wavenumber.imag),
-            )
+            speed = 2 * np.pi * fine / np.abs(wavenumber.real)
+            length = 1e3 / np.abs(wavenumber.imag)
             drawn.append((fine, np.where(wave, np.abs(1 / slowness), np.nan)))
         for ax, y in zip(axes, (speed, length), strict=False):
             ax.plot(fine, y, color=colour(n), lw=1, alpha=PALE)

@@ -14,13 +14,11 @@ from matplotlib.lines import Line2D
 
 from simple_model.drawing import small
 from skinwave.report.palette import label
-from skinwave.report.styles import NARROW, STYLES, TEXT, Style
+from skinwave.report.styles import STYLES, TEXT, Style, is_narrow
 from skinwave.results.run import Run
 
 P = ParamSpec("P")
 REPORT = STYLES["report"]
-SUBSCRIPT = 0.7  # size over that of its letter
-ROW = 1.45  # height of a row of names over the font size
 LINE_STYLE: dict[str, Any] = {"color": "0.6", "lw": 0.8, "ls": ":", "zorder": 0}
 
 
@@ -30,9 +28,8 @@ def png(figure: Figure, dpi: int = 110) -> bytes:
 
 
 def figure_file(figure: Figure, kind: str, dpi: int = 110) -> bytes:
-    """Return a figure as a "png", "svg" or "pdf" file. Text remains text."""
-    buffer = BytesIO()
-    figure.dpi = dpi
+    """Return a figure as a "png", "svg" or "pdf" file, with text as text."""
+    buffer, figure.dpi = BytesIO(), dpi
     with warnings.catch_warnings(), mpl.rc_context(TEXT):
         warnings.filterwarnings("ignore", "Glyph")  # letters that the font lacks become boxes
         if engine := figure.get_layout_engine():  # lay out once for all kinds
@@ -81,7 +78,7 @@ def legend(
     """
     handles = [Line2D([], [], **entry) for entry in entries.values()]
     names = [re.sub(r"(?<![\w$])-(?=\d)", "\u2212", name) for name in entries]
-    columns = columns or (1 if figure.get_figwidth() < NARROW else max(len(entries), 1))
+    columns = columns or (1 if is_narrow(figure.get_figwidth()) else max(len(entries), 1))
     usual: dict[str, Any] = {"loc": "outside lower center", "fontsize": small(), "frameon": False}
     if "loc" not in options:
         usual |= {"handlelength": 1.5, "columnspacing": 1.2}
@@ -97,14 +94,17 @@ def run_label(run: Run) -> str:
 
 def line_symbol(name: str) -> str:
     """Return a line's name as a formula of matplotlib."""
-    name = re.sub(r"f_([A-Za-z0-9]+)", r"f_{\1}", name)
-    return f"${name}$"
+    return "$" + re.sub(r"f_([A-Za-z0-9]+)", r"f_{\1}", name) + "$"
 
 
-def name_size() -> float:
-    """Return the font size in points of names of lines, whose subscripts are legible."""
-    least_subscript = 7.0  # points
-    return max(small(), least_subscript / SUBSCRIPT)
+def name_size(least_subscript: float = 7.0) -> float:
+    """Return the font size in points of names of lines, whose subscripts are 0.7 times as large."""
+    return max(small(), least_subscript / 0.7)
+
+
+def rows_height(rows: int) -> float:
+    """Return the height in points of rows of names of lines above a panel."""
+    return 1.45 * rows * name_size()
 
 
 def name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int = 1) -> None:
@@ -114,23 +114,21 @@ def name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int = 1
     """
     size, occupied = name_size(), [list[tuple[float, float]]() for _ in range(rows)]
     to_axes = ax.transScale + ax.transLimits
-    letter, gap = 0.55, 0.5  # width of a letter of a line's name, and of a gap, over the font size
     for name, frequency in lines.items():
         subscripts = sum(map(len, re.findall(r"_(\w+)", name)))
         signs = len(re.findall(r"[-+]", name))  # which have a space on both sides
-        letters = len(name.replace("_", "")) - (1 - SUBSCRIPT) * subscripts + signs
-        half = size * (letter * letters + gap) / 2
+        letters = len(name.replace("_", "")) - 0.3 * subscripts + signs
+        half = size * (0.55 * letters + 0.5) / 2  # a letter of 0.55 sizes, and a gap
         middle = width * to_axes.transform((frequency, 1.0))[0]
         low, high = middle - half, middle + half
-        free = [
-            k for k, others in enumerate(occupied) if all(high < a or b < low for a, b in others)
-        ]
-        if not free or not (0 <= middle <= width and high <= width + 2 * size):
+        is_free = [all(high < a or b < low for a, b in others) for others in occupied]
+        row = is_free.index(True) if any(is_free) else None
+        if row is None or not (0 <= middle <= width and high <= width + 2 * size):
             continue
-        occupied[free[0]].append((low, high))
+        occupied[row].append((low, high))
         ax.axvline(frequency, **LINE_STYLE)
         ax.annotate(
-            line_symbol(name), (frequency, 1.0), (0, 2 + ROW * size * free[0]),
+            line_symbol(name), (frequency, 1.0), (0, 2 + rows_height(row)),
             xycoords=("data", "axes fraction"), textcoords="offset points", ha="center",
             va="bottom", fontsize=size,
         )  # fmt: skip

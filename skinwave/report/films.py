@@ -18,7 +18,6 @@ from skinwave.results import playback
 from skinwave.results.views import View
 from skinwave.system.effort import Progress, silent
 
-SHORTEST = 4.0  # s, of a film
 FORMATS = {".gif": "image/gif", ".mp4": "video/mp4"}
 ENCODER = ("imageio", "imageio_ffmpeg")
 
@@ -32,9 +31,8 @@ class Film:
     data: bytes
 
     def __repr__(self) -> str:
-        return (
-            f"<Film: {self.frames} frames, {self.suffix[1:].upper()} of {len(self.data):,} bytes>"
-        )
+        kind = self.suffix[1:].upper()
+        return f"<Film: {self.frames} frames, {kind} of {len(self.data):,} bytes>"
 
     def _repr_html_(self) -> str:
         source = f"data:{FORMATS[self.suffix]};base64,{b64encode(self.data).decode()}"
@@ -83,18 +81,16 @@ def played_text(view: View) -> str:
     """Describe which part of a motion is played, and whether it repeats without a jump."""
     span, whole = f"{significant(1e3 * view.period)} ms", playback.whole_period(view.scene.pressure)
     jump = playback.phase_jump(view.scene.tacton, view.period)
-    round_off = 1e-4  # of a turn
-    if jump < round_off:
+    if jump < 1e-4:  # of a turn: round-off
         return f"one period of {span}, which repeats without a jump"
     pattern = f"{significant(1e3 * whole)} ms long" if whole else "that never repeats exactly"
     turn = f"phases jump by up to {100 * jump:.2g} % of a turn at each repetition"
     return f"{span} of a pattern {pattern}; {turn}"
 
 
-def duration(frames: int) -> float:
-    """Return the duration in s of a film with a number of frames."""
-    shortest_frame = 0.04  # s
-    return max(SHORTEST, shortest_frame * frames)
+def duration(frames: int, least: float = 4.0, frame: float = 0.04) -> float:
+    """Return the duration in s of a film with a number of frames, each shown for `frame` s."""
+    return max(least, frame * frames)
 
 
 def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
@@ -105,8 +101,8 @@ def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
     page = [style.paper, style.ink, *COLOURS.values(), *SPARE]
     exact = [int(colour[k : k + 2], 16) for colour in page for k in (1, 3, 5)]
     palette = Pillow.new("P", (1, 1))
-    shades = 240  # colours of a GIF that are chosen from its frames; the others are fixed
-    palette.putpalette(exact + (some.quantize(shades, kmeans=1).getpalette() or []))
+    chosen = some.quantize(240, kmeans=1).getpalette() or []  # beside the exact ones
+    palette.putpalette(exact + chosen)
     shown = [
         Pillow.fromarray(frame).quantize(palette=palette, dither=Pillow.Dither.NONE)
         for frame in frames

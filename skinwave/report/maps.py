@@ -23,12 +23,9 @@ from skinwave.results.views import View, path_points
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats, Ints
 
-PIXELS = 201  # along a side of a snapshot
-MEASURED_EDGE = COLOURS["measured"]
-
 
 def rms_text(pressure: MovingPressure) -> str:
-    """Return the sentence on what a map under a load shows."""
+    """Say what a map under a load shows."""
     if not path_cells(pressure).of_tacton:
         return "RMS of the steady vibration about its mean."
     return (
@@ -55,13 +52,12 @@ def surfaces_figure(
 ) -> Figure:
     """Draw maps of RMS vibration and the path of the focus.
 
-    `surfaces` are maps by column, or one map by its title. If there is a point kernel, its region
-    is outlined on all maps. `measured` values have the colours of maps of displacement.
+    `surfaces` are maps by column, or one map by its title. If there is a point kernel, all maps
+    outline its region. `measured` values have the colours of maps of displacement.
     """
     kernel = next((each for each in surfaces.values() if each.quantity is PRESSURE), None)
     alone = len(surfaces) == 1
-    side, alone_size = 3.85, 5.0  # inch: of a map with its bar, of one map
-    figure, axes = panels(len(surfaces), style, alone_size if alone else side)
+    figure, axes = panels(len(surfaces), style, 5.0 if alone else 3.85)
     entries: dict[str, Any] = _path_entry(scene, "white")
     raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
     orange, pink = "#ff9e4a", "#ff2fd0"  # the kernel's -20 dB, the detection threshold
@@ -95,7 +91,7 @@ def surfaces_figure(
         figure.colorbar(image, ax=ax, label=title, extend=extend)
     if measured:
         entries["measured, in the map's colours"] = {
-            "ls": "", "marker": "s", "mfc": "0.8", "mec": MEASURED_EDGE, "ms": 8
+            "ls": "", "marker": "s", "mfc": "0.8", "mec": COLOURS["measured"], "ms": 8
         }  # fmt: skip
     legend(figure, entries)
     return figure
@@ -115,22 +111,23 @@ def _path_entry(scene: Scene, ink: str) -> dict[str, dict[str, Any]]:
 
 
 def _outlined(ink: str) -> dict[str, Any]:
-    """Return the properties of a line that is visible on every background."""
-    outlines = {"white": "0.4", "black": "white"}  # of lines, to be seen on every background
-    if ink not in outlines:
-        return {"color": ink}
-    return {"color": ink, "path_effects": [withStroke(linewidth=2.3, foreground=outlines[ink])]}
+    """Return the properties of a line: white and black ones are visible on every background."""
+    edges = {"white": "0.4", "black": "white"}
+    effects = [withStroke(linewidth=2.3, foreground=edges[ink])] if ink in edges else []
+    return {"color": ink, "path_effects": effects}
 
 
 def _power_of_ten(values: Floats) -> int:
     """Return the exponent of the unit of a colour bar, 0 if its numbers are short without."""
-    largest = float(np.nanmax(values))
-    power = int(np.floor(np.log10(largest))) if largest else 0
-    return power if not -3 <= power < 4 else 0
+    power = int(np.floor(np.log10(float(np.nanmax(values)) or 1.0)))
+    return 0 if -3 <= power < 4 else power
 
 
-def _finer(field: Floats) -> Floats:
-    """Return a field (ny, nx) on a finer grid, for smooth maps; nan where it is nearer to nan."""
+def _finer(field: Floats, fewest: int = 250) -> Floats:
+    """Return a field (ny, nx) on a finer grid, for smooth maps; nan where it is nearer to nan.
+
+    The longer side of the grid has at least `fewest` points.
+    """
     from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
@@ -139,8 +136,7 @@ def _finer(field: Floats) -> Floats:
         return field
     missing = np.isnan(field)
     nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
-    fewest_pixels = 250  # along the longer side of a map, which is interpolated to be smooth
-    times = -(-fewest_pixels // max(field.shape))
+    times = -(-fewest // max(field.shape))
     fine = tuple(np.linspace(0, n - 1, times * (n - 1) + 1) for n in field.shape)
     values = RectBivariateSpline(rows, columns, field[tuple(nearest)])(*fine)
     off = RegularGridInterpolator((rows, columns), gaussian_filter(missing.astype(float), 1.0))
@@ -158,7 +154,7 @@ def _draw_border(
     x = 1e3 * np.linspace(surface.x[0], surface.x[-1], fine.shape[1])
     y = 1e3 * np.linspace(surface.y[0], surface.y[-1], fine.shape[0])
     lines = ax.contour(x, y, fine, [level], colors=colour, linewidths=1.4, linestyles=dashes)
-    lines.set_path_effects(_outlined(colour).get("path_effects", []))
+    lines.set_path_effects(_outlined(colour)["path_effects"])
     return True
 
 
@@ -169,8 +165,9 @@ def _draw_measured(
     low, high = ((surface.x[end], surface.y[end]) for end in (0, -1))
     within = ((measured.places >= low) & (measured.places <= high)).all(axis=1)
     x, y = 1e3 * measured.places[within].T
-    style: dict[str, Any] = {"marker": "s", "s": 62, "linewidths": 1.4, "zorder": 5}
-    style["edgecolors"] = MEASURED_EDGE
+    style: dict[str, Any] = {
+        "marker": "s", "s": 62, "linewidths": 1.4, "zorder": 5, "edgecolors": COLOURS["measured"]
+    }  # fmt: skip
     if surface.quantity is not DISPLACEMENT:
         ax.scatter(x, y, **style, facecolors="none")
         return "neither"
@@ -186,8 +183,9 @@ def interpolation(view: View, places: Floats) -> Callable[[Floats], Floats]:
 
 
 def on_triangles(points: Floats, triangles: Ints, places: Floats) -> Callable[[Floats], Floats]:
-    """Return the function that interpolates values (s,) at points (s, 3), on triangles (k, 3), at
-    places (..., 2); nan beside the triangles.
+    """Return the function that interpolates values (s,) at points (s, 3) to places (..., 2).
+
+    It interpolates on triangles (k, 3), and returns nan beside them.
     """
     owner, weights = facets_below(points[triangles], places.reshape(-1, 2))
     on = (owner >= 0).reshape(places.shape[:-1])
@@ -202,19 +200,20 @@ def on_triangles(points: Floats, triangles: Ints, places: Floats) -> Callable[[F
 
 
 @with_style
-def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Figure:
+def snapshots_figure(
+    views: Sequence[View], style: Style, count: int = 4, pixels: int = 201
+) -> Figure:
     """Draw the surface of each model relative to its largest motion, at a few times.
 
     At the first time the last model moves most. The others divide a turn of the focus or, if it
-    rests, a period of the strongest tone into equal parts.
+    rests, a period of the strongest tone into equal parts. Each side of a map has so many `pixels`.
     """
     count = min(count, 2) if style.is_narrow else count
     frames = _snapshot_frames(views[-1], count)
     reach = np.min([np.abs(view.places).max(axis=0) for view in views], axis=0)  # common to all
-    raster = np.stack(np.meshgrid(*(np.linspace(-r, r, PIXELS) for r in reach)), axis=-1)
+    raster = np.stack(np.meshgrid(*(np.linspace(-r, r, pixels) for r in reach)), axis=-1)
     extent = tuple(1e3 * np.outer(reach, (-1, 1)).ravel())
-    snapshot = 2.7  # inch
-    size = style.size(snapshot * count + 2.0, snapshot * len(views) + 1.0)
+    size = style.size(2.7 * count + 2.0, 2.7 * len(views) + 1.0)
     if style.is_narrow:
         size = size[0], 0.4 * size[0] * len(views) + 0.9
     figure = Figure(figsize=size, layout="constrained")
@@ -257,9 +256,7 @@ def _mach_angle(view: View) -> float | None:
 
 
 def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, Any]]:
-    entries: dict[str, dict[str, Any]] = {
-        "focus": {**_outlined("black"), "marker": "o", "mfc": "none", "ls": "none"},
-    }
+    entries = {"focus": {**_outlined("black"), "marker": "o", "mfc": "none", "ls": "none"}}
     if not views[0].scene.tacton.trajectory.is_static:
         entries |= _path_entry(views[0].scene, "black")
     angles = [f"{label(view.column)} {np.rad2deg(angle):.0f}°"
@@ -271,8 +268,11 @@ def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, An
     return entries
 
 
-def _draw_focus(ax: Axes, view: View, time: float) -> None:
-    """Draw the focus and, if it is faster than the surface wave, the Mach angle behind it."""
+def _draw_focus(ax: Axes, view: View, time: float, length: float = 0.025) -> None:
+    """Draw the focus and, if it is faster than the surface wave, lines at the Mach angle behind it.
+
+    The lines have a `length` in m, or end where the body ends.
+    """
     path = view.scene.tacton.trajectory
     focus = path.position(time)
     ax.plot(*(1e3 * focus), marker="o", mfc="none", ms=6, mew=1.2, **_outlined("black"))
@@ -280,8 +280,7 @@ def _draw_focus(ax: Axes, view: View, time: float) -> None:
         return
     ahead = path.position(time + 1e-5) - focus
     heading = np.arctan2(ahead[1], ahead[0])
-    cone = 0.025  # m, length of the lines at the Mach angle
-    reach = np.linspace(0, cone, PIXELS)
+    reach = np.linspace(0, length, 201)
     for side in (-1, 1):
         back = heading + np.pi + side * angle
         line = focus + reach[:, None] * [np.cos(back), np.sin(back)]

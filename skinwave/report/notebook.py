@@ -1,6 +1,5 @@
 """Scenes, plans and comparisons as one line of text, and as small pages for notebooks."""
 
-from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,6 +7,7 @@ import numpy as np
 from simple_model import drawing
 from simple_model.numbers import interval, plural
 from skinwave.report.description import scene_rows
+from skinwave.report.palette import BLUE, ORANGE
 from skinwave.typing import Floats
 
 if TYPE_CHECKING:
@@ -18,10 +18,6 @@ if TYPE_CHECKING:
     from skinwave.planning.record import Plan
     from skinwave.results.comparison import Agreement
     from skinwave.scene.scene import Scene
-
-
-def _line(kind: str, parts: Iterable[str]) -> str:
-    return f"<{kind}: {'; '.join(parts)}>"
 
 
 def scene_line(scene: "Scene") -> str:
@@ -37,7 +33,7 @@ def scene_line(scene: "Scene") -> str:
         layers = [f"{1e3 * each.thickness:g} mm of {_label(each.material)}" for each in body.layers]
         size += f", {'; below it '.join([*layers, _label(body.material)])}"
     probes = f"{plural(len(scene.probes), 'probe')}, {scene.reading.words}"
-    return _line(f"Scene {scene.name!r}", [", ".join(load), size, probes])
+    return f"<Scene {scene.name!r}: {', '.join(load)}; {size}; {probes}>"
 
 
 def plan_line(plan: "Plan") -> str:
@@ -45,21 +41,19 @@ def plan_line(plan: "Plan") -> str:
     body = plan.body.of_kind.words(plan.body)
     body += f" halved across {' and '.join(plan.symmetry)}" if plan.symmetry else ""
     size = f"elements of {1e3 * plan.h:.3g} mm" if plan.h else "no mesh"
-    warnings = plural(len(plan.warnings), "warning")
-    parts = [f"{size}, {body}", f"expected error {plan.statement.words}", _cost(plan), warnings]
-    return _line(f"Plan of {plan.model}", parts)
+    return (
+        f"<Plan of {plan.model}: {size}, {body}; expected error {plan.statement.words}; "
+        f"{_cost(plan)}; {plural(len(plan.warnings), 'warning')}>"
+    )
 
 
 def agreement_line(agreement: "Agreement") -> str:
-    """Describe misfits, scale and number of spectral lines."""
-    probes = plural(len(agreement.probes), "probe")
-    parts = [
-        f"relative L2 misfit {_range(agreement.relative_l2)}",
-        f"misfit of the shape {_range(agreement.shape_misfit)}",
-        f"scale {agreement.scale:.4g}",
-        f"{probes}, {plural(len(agreement.frequencies), 'line')}",
-    ]
-    return _line("Agreement", parts)
+    """Describe misfits, scale, and numbers of probes and spectral lines."""
+    return (
+        f"<Agreement: relative L2 misfit {_range(agreement.relative_l2)}; misfit of the shape "
+        f"{_range(agreement.shape_misfit)}; scale {agreement.scale:.4g}; "
+        f"{plural(len(agreement.probes), 'probe')}, {plural(len(agreement.frequencies), 'line')}>"
+    )
 
 
 def _label(material: object) -> str:
@@ -92,7 +86,7 @@ def plan_page(plan: "Plan") -> str:
     def draw(figure: "Figure") -> None:
         ax = figure.subplots()
         _draw_body(ax, plan.body, plan.symmetry)
-        _finish(ax, {})
+        _finish(ax)
 
     kind = plan.body.of_kind
     image = drawing.picture(draw, 3.2, 3.0) if kind.discretise and kind.is_bounded else b""
@@ -102,8 +96,8 @@ def plan_page(plan: "Plan") -> str:
     return drawing.page(f"Plan: {plan.model}", image, tables, plan.warnings)
 
 
-def agreement_page(agreement: "Agreement") -> str:
-    """Return a page with misfit and delay at every probe, and lines in dB."""
+def agreement_page(agreement: "Agreement", most_probes: int = 12) -> str:
+    """Return a page with misfit and delay at each of at most some probes, and lines in dB."""
     with np.errstate(divide="ignore", invalid="ignore"):
         levels = 20 * np.log10(agreement.line_ratios).T
     columns = zip(
@@ -122,13 +116,12 @@ def agreement_page(agreement: "Agreement") -> str:
          f"{1e3 * agreement.spread_candidate[drop]:.3g} mm (candidate)"]
         for drop, reference in agreement.spread_reference.items()
     ]  # fmt: skip
-    most_rows = 12  # probes in a table
-    tables = [drawing.table(facts), drawing.table(rows[:most_rows], header)]
+    tables = [drawing.table(facts), drawing.table(rows[:most_probes], header)]
     return drawing.page("Candidate against reference", b"", tables)
 
 
-def draw_scene(scene: "Scene", ax: "Axes | None") -> "Axes":
-    """Draw body, path, foci at the start and probes from above, in mm."""
+def draw_scene(scene: "Scene", ax: "Axes | None", most_numbered: int = 20) -> "Axes":
+    """Draw body, path, foci at the start and probes from above, in mm; number the first probes."""
     ax, path = drawing.new_axes(ax), scene.tacton.trajectory
     _draw_body(ax, scene.body)
     if not path.is_static:
@@ -136,20 +129,17 @@ def draw_scene(scene: "Scene", ax: "Axes | None") -> "Axes":
         ax.plot(x, y, color="#222222", lw=1.2, ls="dotted", label="path")
     _draw_foci(ax, scene)
     x, y = 1e3 * scene.probe_points.T
-    probe = "#0072B2"
-    ax.plot(x, y, ls="none", marker="o", ms=4, color=probe, label="probes")
-    most_numbered = 20  # probes with a number
+    ax.plot(x, y, ls="none", marker="o", ms=4, color=BLUE, label="probes")
     for k in range(min(len(x), most_numbered)):
-        ax.annotate(str(k), (x[k], y[k]), xytext=(3, 3), textcoords="offset points", color=probe,
+        ax.annotate(str(k), (x[k], y[k]), xytext=(3, 3), textcoords="offset points", color=BLUE,
                     fontsize=drawing.small())  # fmt: skip
-    narrowest = 0.5  # inch per point of font size: a narrower legend has one column
-    narrow = ax.figure.get_figwidth() < narrowest * drawing.small()  # type: ignore[union-attr]
-    compact = {"borderaxespad": 0.2, "handlelength": 1.5, "columnspacing": 1.0}
-    _finish(ax, {"ncols": 1 if narrow else 2, **compact})
+    inch = ax.figure.get_figwidth()  # type: ignore[union-attr]
+    columns = 1 if inch < 0.5 * drawing.small() else 2
+    _finish(ax, ncols=columns, borderaxespad=0.2, handlelength=1.5, columnspacing=1.0)
     return ax
 
 
-def _finish(ax: "Axes", legend: Mapping[str, Any]) -> None:
+def _finish(ax: "Axes", **legend: Any) -> None:
     """Label axes in mm and add a legend above them."""
     ax.set(aspect="equal", xlabel="x, mm", ylabel="y, mm")
     ax.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize=drawing.small(),
@@ -185,19 +175,18 @@ def _draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
     ax.autoscale_view()
 
 
-def _draw_foci(ax: "Axes", scene: "Scene") -> None:
-    """Draw the contour of half the pressure around every focus at the start."""
-    tacton, width = scene.tacton, scene.pressure.spot_scale
+def _draw_foci(ax: "Axes", scene: "Scene", reach: float = 4.0) -> None:
+    """Draw the contour of half the pressure around every focus at the start.
+
+    It lies within `reach` times the width of a focal spot.
+    """
+    tacton = scene.tacton
     phases = np.mod(tacton.trajectory.phase(0.0) + np.array(tacton.foci), 1.0)
-    spot_reach = 4.0  # widths of a focal spot within which its contour is drawn
-    across = spot_reach * width * np.linspace(-1, 1, 81)
-    grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
-    shape = len(across), len(across)
-    focus, half = "#D55E00", 0.5  # colour of a contour, and part of the pressure at a focus
+    across = reach * scene.pressure.spot_scale * np.linspace(-1, 1, 81)
+    grid = np.stack(np.meshgrid(across, across), axis=-1)
     for centre in tacton.trajectory.at_phase(phases):
-        places = grid + centre
-        spot = scene.pressure.spot(places, centre).reshape(shape)
-        x, y = 1e3 * places.reshape(*shape, 2).transpose(2, 0, 1)
-        ax.contour(x, y, spot, [half * spot.max()], colors=focus, linewidths=1.5)
+        spot = scene.pressure.spot((grid + centre).reshape(-1, 2), centre).reshape(grid.shape[:2])
+        x, y = np.moveaxis(1e3 * (grid + centre), -1, 0)
+        ax.contour(x, y, spot, [0.5 * spot.max()], colors=ORANGE, linewidths=1.5)
     several = f"{len(tacton.foci)} foci" if len(tacton.foci) > 1 else "focus"
-    ax.plot([], [], color=focus, lw=1.5, label=f"{several}, half pressure")
+    ax.plot([], [], color=ORANGE, lw=1.5, label=f"{several}, half pressure")

@@ -10,14 +10,13 @@ import matplotlib as mpl
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 
 BLUE, ORANGE = "#0072B2", "#D55E00"
-GREEN = "#009E73"
-SPARE = (GREEN, "#CC79A7", "#E69F00", "#56B4E9")
+SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 SERIES = (BLUE, ORANGE, *SPARE)  # of other curves
 COLOURS = {
     **{model.name: model.colour for model in (SAME_LOAD, PUBLISHED)},
     "paper-sheet": ORANGE,
     "skin-slab": BLUE,
-    "palm": GREEN,
+    "palm": SPARE[0],
     "measured": "#CC79A7",
 }
 SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # colour maps of quantities with and without a sign
@@ -46,9 +45,8 @@ def line_style(column: str) -> dict[str, Any]:
 
 
 def dashes(column: str) -> Any:
-    """Return the dashes of the waveform of a `Run.column`."""
-    by_name: dict[str, Any] = {"paper-sheet": (0, (5, 1))}  # of waveforms, for print in grey
-    return by_name.get(column, "solid")
+    """Return the dashes of the waveform of a `Run.column`, for print in grey."""
+    return (0, (5, 1)) if column == "paper-sheet" else "solid"
 
 
 def label(column: str) -> str:

@@ -31,38 +31,39 @@ Interpolation = Callable[[Floats], Floats]  # values (s,) of a surface -> values
 CAMERAS = {  # directions from the body to the camera
     "tilted": (-0.45, -1.0, 0.85), "front": (0.0, -1.0, 0.45), "top": (0.0, 0.0, 1.0),
 }  # fmt: skip
-LARGEST_DRAWN = 0.06  # of the body's width, for the largest motion
-FONT = findfont("DejaVu Sans")  # of all figures
-COLUMN = 0.26  # width of the colour bar over the height of the picture
-WIDTH = 1600  # pixels, of a picture that is not for print
-PAGE, LETTERS = 7.0, 8.0  # inch, width of a page; points, size of letters at that width
-SHARP = 35.0  # degrees, of edges that are not smoothed
 LIFT = 0.004  # of the body's size: height of path, probes and focus above the surface
-PATH, FOCUS, PROBE = "black", "black", "#ffd000"  # colours of marks
+MARKS = {"path": "black", "focus": "black", "probes": "#ffd000"}  # their colours
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Panel:
-    """Geometry of one view: triangles of its surface and their nodes (n,), marks that move with it,
-    the focus, the interpolation to the focus in every frame, the exaggeration, and the height in mm
-    of marks above the surface.
+    """Geometry of one view.
+
+    Parameters
+    ----------
+    skin, nodes : triangles of its surface, and their nodes (n,)
+    marks : meshes that move with the surface, each with the interpolation to its points
+    focus, under_focus : the focus, and the interpolation to its place in every frame
+    lift : mm, height of marks above the surface
     """
 
     view: View
     skin: Any
     nodes: Ints
-    marks: tuple[tuple[Any, Interpolation], ...]
+    marks: list[tuple[Any, Interpolation]]
     focus: Any
     under_focus: Interpolation
-    factor: float
     lift: float
 
 
-def exaggeration(view: View) -> float:
-    """Return the exaggeration of motion: 1, 2 or 5 times a power of ten; 0 for the point kernel."""
+def exaggeration(view: View, largest: float = 0.06) -> float:
+    """Return the exaggeration of motion: 1, 2 or 5 times a power of ten; 0 for the point kernel.
+
+    With it, the largest motion is at most `largest` times the width of the body.
+    """
     if view.quantity is PRESSURE:
         return 0.0
-    most = LARGEST_DRAWN * float(np.ptp(view.places[:, 0])) / view.peak
+    most = largest * float(np.ptp(view.places[:, 0])) / view.peak
     power = 10.0 ** floor(log10(most))
     return power * max(step for step in (1, 2, 5) if step * power <= most)
 
@@ -86,8 +87,9 @@ def picture(
     width of a column, and several have that of a page.
     """
     width, height = style.panel
-    inch = style.size(PAGE if len(views) > 1 else PAGE / 2, PAGE)[0] if style.columns else PAGE
-    larger = pixels(style, inch) / (len(views) * width + COLUMN * height)
+    page = style.page
+    inch = style.size(page if len(views) > 1 else page / 2, page)[0] if style.columns else page
+    larger = style.pixels(inch) / (len(views) * width + style.bar * height)
     panel = round(larger * width), round(larger * height)
     with stage(views, style, camera=camera, cut=cut, panel=panel, inch=inch) as show:
         return show(frame)
@@ -95,14 +97,11 @@ def picture(
 
 @contextmanager
 def new_plotter(style: Style, size: tuple[int, int], panels: int = 1) -> Iterator[Any]:
-    """Context manager of a plotter with panels side by side, each of a size in pixels.
-
-    VTK prints no warnings, such as those about displays.
-    """
+    """Context manager of a plotter with panels side by side, each of a size in pixels."""
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # no warnings, such as on displays
     plotter = pv.Plotter(
         off_screen=True, lighting="none", shape=(1, panels), border=False,
         window_size=(size[0] * panels, size[1]),
@@ -113,11 +112,6 @@ def new_plotter(style: Style, size: tuple[int, int], panels: int = 1) -> Iterato
         yield plotter
     finally:
         plotter.close()
-
-
-def pixels(style: Style, inch: float) -> int:
-    """Return the width in pixels of a picture that is `inch` wide in print."""
-    return round(inch * style.dpi) if style.columns else WIDTH
 
 
 def raster(figure: Figure, dpi: float) -> Image:
@@ -131,40 +125,35 @@ def raster(figure: Figure, dpi: float) -> Image:
 @contextmanager
 def stage(
     views: Sequence[View], style: Style, *, camera: str = "tilted", cut: bool = False,
-    panel: tuple[int, int] | None = None, inch: float = PAGE,
+    panel: tuple[int, int] | None = None, inch: float | None = None,
 ) -> Iterator[Callable[[int], Image]]:  # fmt: skip
     """Context manager that builds a plotter once and yields a function from a frame to a picture.
 
-    All views share a colour scale: motion into the body relative to the largest of each model or,
-    for a single view, in its unit; other quantities in their unit, from 0 if they have no sign.
-    Letters have `LETTERS` points in a picture that is `inch` wide.
+    All views share a colour scale. Several views show motion into the body relative to the largest
+    of each model, a single view in its unit. Other quantities are in their unit, from 0 if they
+    have no sign. Letters are those of a picture that is `inch` wide, by default a page.
     """
     width, height = panel or style.panel
-    column = round(COLUMN * height)
+    column = round(style.bar * height)
     least_letter = 11.0  # pixels, in films
-    letter = max(LETTERS / 72 * (width * len(views) + column) / inch, least_letter)
+    letter = max(style.letter(width * len(views) + column, inch or style.page), least_letter)
     # Part of a panel that bodies fill, along its width and height, and the middle of that height.
     filled, middle = (0.92, 0.74), 0.44
     with new_plotter(style, (width, height), len(views)) as plotter:
         limits, title = _colour_scale(views)
         bar = _colour_bar(limits, title, style, letter, (column, height))
-        panels = []
+        panels = [make_panel(view, cut) for view in views]
+        shown = [each for one in panels for each in (
+            1e3 * one.view.points[one.nodes], scale_bar(1e3 * one.view.points)
+        )]  # fmt: skip
         for k, view in enumerate(views):
             plotter.subplot(0, k)
-            panels.append(make_panel(view, cut))
-            _draw_panel(plotter, panels[-1], style, limits, letter, lit=camera != "top")
+            _draw_panel(plotter, panels[k], style, limits, letter, lit=camera != "top")
             if not (cut or len(view.tets)):  # the rim of the surface at rest
                 low, high = view.places.min(axis=0), view.places.max(axis=0)
                 rim = np.where([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], high, low)
                 plotter.add_mesh(_line(rim, 0.0), color="#9a9a9a", line_width=1)
-        shown = [each for panel in panels for each in (
-            1e3 * panel.view.points[panel.nodes], scale_bar(1e3 * panel.view.points)
-        )]  # fmt: skip
-        fitting = Projection.of(CAMERAS[camera], np.vstack(shown), width / height, filled, middle)
-        for k in range(len(views)):
-            plotter.subplot(0, k)
-            fitting.apply(plotter)
-        plotter.subplot(0, 0)
+            set_camera(plotter, CAMERAS[camera], np.vstack(shown), width / height, filled, middle)
 
         def show(frame: int) -> Image:
             set_frame(panels, frame, limits[1])
@@ -182,8 +171,8 @@ def write(
 ) -> None:
     """Write text with letters of so many pixels at a place of the current panel."""
     plotter.add_text(
-        text, position=place, viewport=True, font_size=letter / 2, font_file=FONT, color=ink,
-        **options,
+        text, position=place, viewport=True, font_size=letter / 2, color=ink,
+        font_file=findfont("DejaVu Sans"), **options,
     )  # fmt: skip
 
 
@@ -216,13 +205,13 @@ def _colour_scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
 
 
 def make_panel(view: View, cut: bool = False) -> Panel:
-    """Return the geometry of a view."""
+    """Return the geometry of a view; with `cut`, without the half of its body at y < 0."""
     import pyvista as pv
 
     nodes, triangles = outer_surface(view, cut)
     skin = pv.PolyData.from_regular_faces(1e3 * view.points[nodes], triangles)
     skin["node"] = nodes
-    skin = skin.compute_normals(feature_angle=SHARP, split_vertices=True)  # edges stay sharp
+    skin = with_normals(skin)
     nodes = np.asarray(skin["node"])
     skin["motion"] = np.zeros(len(nodes), np.float32)
     path, probes = path_points(view.scene), view.scene.probe_points
@@ -236,11 +225,14 @@ def make_panel(view: View, cut: bool = False) -> Panel:
         riding.append((_line(edge, lift, cut), edge))
     marks = [(mesh, interpolation(view, 0.9999 * places)) for mesh, places in riding]
     under = interpolation(view, 0.9999 * view.scene.tacton.trajectory.position(view.times))
-    return Panel(
-        view=view, skin=skin, nodes=nodes, marks=tuple(marks),
-        focus=pv.PolyData(_lift(path[:1], lift)), under_focus=under, factor=exaggeration(view),
-        lift=lift,
-    )  # fmt: skip
+    focus = pv.PolyData(_lift(path[:1], lift))
+    return Panel(view=view, skin=skin, nodes=nodes, marks=marks, focus=focus, under_focus=under,
+                 lift=lift)  # fmt: skip
+
+
+def with_normals(skin: Any, sharp: float = 35.0) -> Any:
+    """Return a surface with normals; edges above `sharp` degrees are not smoothed."""
+    return skin.compute_normals(feature_angle=sharp, split_vertices=True)
 
 
 def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
@@ -273,7 +265,7 @@ def _draw_panel(
     plotter: Any, panel: Panel, style: Style, limits: tuple[float, float], letter: float, *,
     lit: bool,
 ) -> None:  # fmt: skip
-    """Draw a panel."""
+    """Draw surface, marks, names and scale bar of a panel."""
     view = panel.view
     plotter.add_mesh(
         panel.skin, scalars="motion", cmap=SIGNED if limits[0] else SEQUENTIAL, clim=limits,
@@ -295,10 +287,10 @@ def add_marks(plotter: Any, marks: Sequence[Any], focus: Any, letter: float) -> 
     balls, pixel = {"render_points_as_spheres": True}, letter / 16
     for mark in marks:
         if mark.n_lines:
-            plotter.add_mesh(mark, color=PATH, line_width=2 * pixel)
+            plotter.add_mesh(mark, color=MARKS["path"], line_width=2 * pixel)
         else:
-            plotter.add_mesh(mark, color=PROBE, point_size=10 * pixel, **balls)
-    plotter.add_mesh(focus, color=FOCUS, point_size=15 * pixel, **balls)
+            plotter.add_mesh(mark, color=MARKS["probes"], point_size=10 * pixel, **balls)
+    plotter.add_mesh(focus, color=MARKS["focus"], point_size=15 * pixel, **balls)
 
 
 def add_scale_bar(plotter: Any, points: Floats, style: Style, letter: float) -> None:
@@ -314,9 +306,9 @@ def add_scale_bar(plotter: Any, points: Floats, style: Style, letter: float) -> 
 def add_label(plotter: Any, text: str, place: Floats, letter: float, ink: str) -> None:
     """Write text to the right of a place (3,) in mm, with letters of so many pixels."""
     plotter.add_point_labels(
-        place[None], [text], font_size=round(letter), font_file=FONT, text_color=ink, shape=None,
-        show_points=False, always_visible=True, justification_horizontal="left",
-        justification_vertical="center",
+        place[None], [text], font_size=round(letter), font_file=findfont("DejaVu Sans"),
+        text_color=ink, shape=None, show_points=False, always_visible=True,
+        justification_horizontal="left", justification_vertical="center",
     )  # fmt: skip
 
 
@@ -330,54 +322,36 @@ def scale_bar(points: Floats) -> Floats:
     return np.array([[left, front, bottom], [left + length, front, bottom]])
 
 
-@dataclass(frozen=True, kw_only=True)
-class Projection:
-    """Parallel projection: directions (3, 3) to the right, upwards and to the camera, and the
-    middle (2,) and half sides (2,) of the visible rectangle in mm.
+def set_camera(
+    plotter: Any, direction: Sequence[float], points: Floats, aspect: float,
+    filled: tuple[float, float] = (0.92, 0.92), height: float = 0.5,
+) -> None:  # fmt: skip
+    """Set the lights of a panel and its camera, which has no perspective.
+
+    Points (n, 3) in mm, seen from a direction, fill a part of width and height of a picture with
+    this aspect ratio, about the middle of its width and a relative `height`.
     """
+    import pyvista as pv
 
-    axes: Floats
-    middle: Floats
-    half: Floats
-
-    @classmethod
-    def of(
-        cls, direction: Sequence[float], points: Floats, aspect: float,
-        filled: tuple[float, float] = (0.92, 0.92), height: float = 0.5,
-    ) -> "Projection":  # fmt: skip
-        """Return the projection from a direction that shows points (n, 3), as large as fits.
-
-        They fill a part of width and height of a picture with this aspect ratio, about the middle
-        of its width and a relative `height`.
-        """
-        towards = np.array(direction) / np.linalg.norm(direction)
-        right = np.cross([0.0, 0.0, 1.0], towards) if towards[:2].any() else np.array([1.0, 0, 0])
-        right = right / np.linalg.norm(right)
-        axes = np.array([right, np.cross(towards, right), towards])
-        flat = points @ axes[:2].T
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        across, up = (high - low) / filled / 2
-        half = np.array([aspect, 1.0]) * max(across / aspect, up)
-        return cls(
-            axes=axes, middle=(low + high) / 2 + [0.0, half[1] * (1 - 2 * height)], half=half
-        )
-
-    def apply(self, plotter: Any) -> None:
-        """Set the camera and lights of a plotter's panel."""
-        import pyvista as pv
-
-        aim, camera = self.middle @ self.axes[:2], plotter.camera
-        camera.focal_point = tuple(aim)
-        camera.position = tuple(aim + 10 * self.half.max() * self.axes[2])
-        camera.up = tuple(self.axes[1])
-        camera.parallel_projection = True
-        camera.parallel_scale = self.half[1]
-        for light in (
-            pv.Light(light_type="headlight", color="white", intensity=0.6),
-            pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5),
-        ):
-            plotter.add_light(light, only_active=True)
-        plotter.renderer.reset_camera_clipping_range()
+    towards = np.array(direction) / np.linalg.norm(direction)
+    right = np.cross([0.0, 0.0, 1.0], towards) if towards[:2].any() else np.array([1.0, 0, 0])
+    right = right / np.linalg.norm(right)
+    axes = np.array([right, np.cross(towards, right)])
+    low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+    across, up = (high - low) / filled / 2
+    half = max(across / aspect, up)  # of the visible height
+    aim, camera = ((low + high) / 2 + [0.0, half * (1 - 2 * height)]) @ axes, plotter.camera
+    camera.focal_point = tuple(aim)
+    camera.position = tuple(aim + 10 * half * max(aspect, 1.0) * towards)
+    camera.up = tuple(axes[1])
+    camera.parallel_projection = True
+    camera.parallel_scale = half
+    for light in (
+        pv.Light(light_type="headlight", color="white", intensity=0.6),
+        pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5),
+    ):
+        plotter.add_light(light, only_active=True)
+    plotter.renderer.reset_camera_clipping_range()
 
 
 def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
@@ -385,7 +359,7 @@ def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
     for panel in panels:
         view = panel.view
         motion = np.asarray(view.motion[frame], np.float64)
-        drawn = 1e3 * view.points + 1e3 * panel.factor * motion
+        drawn = 1e3 * view.points + 1e3 * exaggeration(view) * motion
         panel.skin.points[:] = drawn[panel.nodes]
         if view.shade is None:
             values = -np.float32(limit / view.peak) * view.motion[frame, panel.nodes, 2]

@@ -26,14 +26,14 @@ def renderer() -> Renderer:
 @cache
 def begin() -> "Future[Renderer]":
     """Begin the test, which takes more than a second, beside other work."""
-    with_one = ThreadPoolExecutor(1)
-    testing = with_one.submit(_test)
-    with_one.shutdown(wait=False)
+    thread = ThreadPoolExecutor(1)
+    testing = thread.submit(_test)
+    thread.shutdown(wait=False)
     return testing
 
 
-def _test() -> Renderer:
-    timeout = 60.0  # s
+def _test(timeout: float = 60.0) -> Renderer:
+    """Draw in a child process, within a `timeout` in s."""
     try:
         name = subprocess_call.call(draw_sphere, timeout=timeout)
         return Renderer(is_available=True, detail=name)

@@ -14,20 +14,19 @@ from simple_model.quantities import DISPLACEMENT, Quantity
 from simple_model.threshold import BAND, HIGHEST, LOWEST
 from skinwave.report.figures import (
     REPORT,
-    ROW,
     legend,
     line_symbol,
     name_lines,
     name_size,
+    rows_height,
     run_label,
     with_style,
 )
 from skinwave.report.palette import colour, dashes, ink_colour, label, line_style, marker
-from skinwave.report.styles import NARROW, SHOWN, Style
+from skinwave.report.styles import SHOWN, Style, is_narrow
 from skinwave.results.run import Run
 from skinwave.typing import Floats
 
-FLOOR = -80.0  # dB
 HIGHEST_SHOWN = 650.0  # Hz
 CURVE: dict[str, Any] = {"color": "0.45", "lw": 1.5}
 THRESHOLD_BAND: dict[str, Any] = {"color": "0.5", "alpha": 0.25}
@@ -52,22 +51,20 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
         _draw_waveforms(axes[p, 0], runs, p)
         _draw_spectra(axes[p, 1], runs, p)
         axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
-    short_titles = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
-    # Titles of the columns of a Tacton's figure, in one line and in two.
-    full_titles = (
-        "waveform about its mean, over the model's largest",
-        "spectrum, dB re the model's largest line",
-    )
-    titles = short_titles if narrow else full_titles
-    axes[0, 0].set_title(f"{title}\n{titles[0]}", fontsize="medium", parse_math=False)
     pad = None
-    marked = ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d")  # lines that a Tacton's figure names
     if narrow:
-        axes[0, 1].set_yticks(np.arange(FLOOR, 1, 40))
+        titles = "waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line"
+        axes[0, 1].set_yticks(np.arange(axes[0, 1].get_ylim()[0], 1, 40))
     else:
-        pad, frequencies = 4 + ROW * name_size(), runs[0].frequencies
-        lines = {name: frequencies[name] for name in marked if name in frequencies}
+        titles = (
+            "waveform about its mean, over the model's largest",
+            "spectrum, dB re the model's largest line",
+        )
+        pad, frequencies = 4 + rows_height(1), runs[0].frequencies
+        marked = (n for n in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") if n in frequencies)
+        lines = {name: frequencies[name] for name in marked}
         name_lines(axes[0, 1], lines, 72 * axes[0, 1].get_position().width * size[0])
+    axes[0, 0].set_title(f"{title}\n{titles[0]}", fontsize="medium", parse_math=False)
     axes[0, 1].set_title(titles[1], fontsize="medium", pad=pad)
     axes[-1, 0].set_xlabel("time, ms")
     axes[-1, 1].set_xlabel("frequency, Hz")
@@ -79,18 +76,16 @@ def _legend(figure: Figure, runs: list[Run]) -> int:
     entries: dict[str, dict[str, Any]] = {}
     for run in runs:
         scale = run.response.record.text(_largest(run, runs))
-        entries[f"{run_label(run)}, 1 = {scale}"] = {
-            **line_style(run.column), "ls": dashes(run.column), "lw": 2
-        }  # fmt: skip
+        style = line_style(run.column) | {"ls": dashes(run.column), "lw": 2}
+        entries[f"{run_label(run)}, 1 = {scale}"] = style
     if kinds := dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
         entries[f"open: {', '.join(kinds)}"] = {
             "color": "0.3", "marker": "^", "mfc": "none", "ls": ""
         }  # fmt: skip
-    most_columns = 3  # of a legend
-    columns = len(entries) if len(entries) <= most_columns else -(-len(entries) // 2)
+    columns = len(entries) if len(entries) <= 3 else -(-len(entries) // 2)
     letter, handle = 0.07, 0.5  # inch: of a letter of a legend, and of a handle with its space
     room = int(figure.get_figwidth() / (letter * max(map(len, entries)) + handle))
-    columns = 1 if figure.get_figwidth() < NARROW else max(1, min(columns, room))
+    columns = 1 if is_narrow(figure.get_figwidth()) else max(1, min(columns, room))
     return legend(figure, entries, columns, loc="upper center", fontsize=None)
 
 
@@ -104,10 +99,9 @@ def _common_end(run: Run, runs: list[Run]) -> slice:
     return slice(max(0, last - 1 - round(SHOWN / (times[1] - times[0]))), last)
 
 
-def _remove_mean(run: Run, runs: list[Run]) -> Floats:
-    """Return the drawn part (t, p) of the response about its mean in the steady state."""
+def _remove_mean(run: Run, runs: list[Run], settle: float = 0.25) -> Floats:
+    """Return the drawn part (t, p) of the response about its mean after a part of it."""
     motion = run.response.values
-    settle = 0.25  # part of the response in which the transient decays
     return motion[_common_end(run, runs)] - motion[int(settle * len(motion)) :].mean(axis=0)
 
 
@@ -119,44 +113,38 @@ def _draw_waveforms(ax: Axes, runs: list[Run], p: int) -> None:
     for run in runs:
         centred = _remove_mean(run, runs)[:, p] / _largest(run, runs)
         times = 1e3 * run.response.times[_common_end(run, runs)]
-        ax.plot(
-            times, centred, color=ink_colour(run.column), ls=dashes(run.column), lw=_width(run),
-            zorder=_depth(run),
-        )  # fmt: skip
+        ax.plot(times, centred, ls=dashes(run.column), **_curve(run))
     ax.margins(x=0)
     ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
     ax.set_ylim(-1.1, 1.1)
     ax.grid(alpha=0.25)
 
 
-def _draw_spectra(ax: Axes, runs: list[Run], p: int) -> None:
+def _draw_spectra(ax: Axes, runs: list[Run], p: int, floor: float = -80.0) -> None:
+    """Draw spectra and lines at a probe, down to a level in dB."""
     lowest_shown = 8.0  # Hz: the mean and its leakage lie below
     for run in runs:
         f, amplitude = spectrum(run.response, "blackmanharris")
         moving = f > lowest_shown
         top = max(float(amplitude[moving].max()), np.finfo(float).tiny)
         level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
-        style = {**line_style(run.column), "zorder": _depth(run)}
-        ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **(style | {"marker": ""}))
+        style = _curve(run)
+        ax.plot(f[moving], level, alpha=0.6, **(style | {"lw": style["lw"] - 0.3}))
         lines = [(f, run.table.amplitudes[name][p]) for name, f in run.line_hz.items()]
         peaks = [(peak.frequency, peak.amplitudes[p]) for peak in run.unnamed]
         for points, face in ((lines, colour(run.column)), (peaks, "none")):
             at, size = np.array(points).reshape(-1, 2).T  # may be empty
             height = 20 * np.log10(np.maximum(size / top, 1e-12))
-            above = height > FLOOR
-            ax.plot(at[above], height[above], ls="", ms=4, mfc=face, **style)
-    ax.set_xlim(0, HIGHEST_SHOWN)
-    ax.set_ylim(FLOOR, 5)
-    ax.set_yticks(np.arange(FLOOR, 1, 20))
+            above, mark = height > floor, marker(run.column)
+            ax.plot(at[above], height[above], ls="", marker=mark, ms=4, mfc=face, **style)
+    ax.set(xlim=(0, HIGHEST_SHOWN), ylim=(floor, 5), yticks=np.arange(floor, 1, 20))
     ax.grid(alpha=0.25)
 
 
-def _width(run: Run) -> float:
-    return 1.0 if run.body == "none" else 1.4
-
-
-def _depth(run: Run) -> int:
-    return 4 if run.body == "none" else 3
+def _curve(run: Run) -> dict[str, Any]:
+    """Return the properties of a curve; point kernels are thin and in front."""
+    width, order = (1.0, 4) if run.body == "none" else (1.4, 3)
+    return {"color": ink_colour(run.column), "lw": width, "zorder": order}
 
 
 @with_style
@@ -175,11 +163,10 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     width = 72 * size[0] / shape[1] - 8 * style.font  # points
     for ax, run in zip(axes, runs, strict=False):
         _draw_levels(ax, run, probe, width)
-    small_number = 1e-4  # at least: written without an exponent
     if runs:
         low, high = _level_limits([*axes])
         axes[0].set_ylim(low, high)
-        if low > small_number:  # without small exponents
+        if low > 1e-4:  # written without an exponent
             axes[0].yaxis.set_major_formatter("{x:g}")
     entries: dict[str, dict[str, Any]] = {}
     if any(run.is_skin for run in runs):
@@ -206,19 +193,21 @@ def strongest_probe(runs: Sequence[Run]) -> int:
 def sensation_levels(run: Run, probe: int) -> dict[str, float]:
     """Return the levels of lines at a probe in dB above threshold, the highest first.
 
-    It is empty unless the body is skin.
+    Return none unless the body is skin.
     """
     names = run.in_pulses.frequencies if run.levels else ()
     levels = {name: float(run.levels[name][probe]) for name in names}
     return dict(sorted(levels.items(), key=lambda item: -item[1]))
 
 
-def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
-    """Draw lines and their names: by sensation level or, if not skin, by amplitude."""
+def _draw_levels(ax: Axes, run: Run, probe: int, width: float, lowest_level: float = -30.0) -> None:
+    """Draw lines and their names: by sensation level or, if not skin, by amplitude.
+
+    Lines of skin below a level in dB above threshold are left out.
+    """
     table = run.in_pulses if run.is_skin else run.table
     amplitudes = {name: float(values[probe]) for name, values in table.amplitudes.items()}
     names = sorted(amplitudes, key=lambda name: -amplitudes[name])
-    lowest_level = -30.0  # dB re threshold: weaker lines are not drawn
     if run.is_skin:
         levels = sensation_levels(run, probe)
         names = [name for name, level in levels.items() if level > lowest_level]
@@ -235,11 +224,9 @@ def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
         ax.plot(peak.frequency, per_unit * peak.amplitudes[probe], ls="none", mfc="none", **style)
     ax.set(xscale="log", yscale="log", xlim=(LOWEST, HIGHEST), xlabel="frequency, Hz")
     ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
-    name_rows, most_named = 3, 12  # of names above a panel of sensation levels
-    ax.set_title(run_label(run), pad=4 + name_rows * ROW * name_size())
+    ax.set_title(run_label(run), pad=4 + rows_height(3))
     ax.grid(alpha=0.25)
-    named = {name: table.frequencies[name] for name in names[:most_named]}
-    name_lines(ax, named, width, name_rows)
+    name_lines(ax, {name: table.frequencies[name] for name in names[:12]}, width, rows=3)
 
 
 def _level_limits(axes: Sequence[Axes]) -> tuple[float, float]:
@@ -248,12 +235,9 @@ def _level_limits(axes: Sequence[Axes]) -> tuple[float, float]:
                             if line.get_transform() == ax.transData])  # fmt: skip
     shown = shown[shown > 0]
     low, high = (shown.min(), shown.max()) if len(shown) else (0.1, 1.0)
-    # Least ratio of the lowest line to the lowest decade, largest ratio of all values, and the end
-    # of the axis over that decade, whose label then does not touch that of the other axis.
-    below, most_ratio, corner = 1.5, 1e4, 0.6
-    low = max(low, high / most_ratio)
-    bottom = corner * 10.0 ** np.floor(np.log10(low / below))
-    return bottom, 10.0 ** np.ceil(np.log10(high))
+    low = max(low, high / 1e4)
+    # The axis begins below the lowest decade, whose label then does not touch the other axis.
+    return 0.6 * 10.0 ** np.floor(np.log10(low / 1.5)), 10.0 ** np.ceil(np.log10(high))
 
 
 @with_style
@@ -284,17 +268,15 @@ def lines_figure(
     strongest = np.sort(np.argsort(-np.abs(measured).max(axis=1), kind="stable")[:MOST_LINES])
     figure = Figure(figsize=style.size(10.5, 1.45 * len(strongest) + 1.7), layout="constrained")
     axes = figure.subplots(len(strongest), 2, sharex=True, squeeze=False)
-    normal_95 = 1.96
     shift = 0.12  # of the distance between two places, by which models are drawn apart
-    weakest_phase = 0.02  # of a line's largest amplitude: weaker lines have no phase drawn
     for (left, right), k in zip(axes, strongest, strict=True):
-        noise = normal_95 * np.nan_to_num(error[k])
+        noise = 1.96 * np.nan_to_num(error[k])  # of 95 %
         _draw_noise(left, right, quantity.per_unit * np.abs(measured[k]), quantity.per_unit * noise)
         for n, (column, model) in enumerate(models.items()):
             at = np.arange(len(places)) + shift * (n - (len(models) - 1) / 2)
             size = np.abs(model[k])
-            strong = size > weakest_phase * size.max(initial=0.0)
-            phase = np.where(strong, np.degrees(np.angle(model[k] * measured[k].conj())), np.nan)
+            has_phase = size > 0.02 * size.max(initial=0.0)
+            phase = np.where(has_phase, np.degrees(np.angle(model[k] * measured[k].conj())), np.nan)
             markers, filled = _markers(column), differs[column][k]
             for mask, face in ((filled, markers["color"]), (~filled, "none")):
                 left.plot(at[mask], quantity.per_unit * size[mask], mfc=face, **markers)

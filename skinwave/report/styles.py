@@ -10,14 +10,16 @@ from simple_model.choices import choose
 # Settings for writing files: text as text in SVG, TrueType fonts in PDF.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
-NARROW = 5.0  # inch: narrower figures have one column of panels
 
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """Style of pictures: colours of paper and ink, font size in points, dots per inch, widths in
-    inches of one and of two columns of a printed page, and size in pixels of a model in three
-    dimensions on a screen.
+    """Style of pictures: colours of paper and ink, font size in points, dots per inch, and widths
+    in inches of one and of two columns of a printed page, or None for a screen.
+
+    Pictures in three dimensions have `panel` pixels for each model on a screen, and `screen` pixels
+    of width in all. On a `page` in inches, their letters have `solid_font` points. The colour bar
+    is `bar` times as wide as the picture is high.
     """
 
     paper: str = "#ffffff"
@@ -26,6 +28,10 @@ class Style:
     dpi: int = 110
     columns: tuple[float, float] | None = None
     panel: tuple[int, int] = (480, 432)
+    screen: int = 1600
+    page: float = 7.0
+    solid_font: float = 8.0
+    bar: float = 0.26
 
     @property
     def zoom(self) -> float:
@@ -35,7 +41,15 @@ class Style:
     @property
     def is_narrow(self) -> bool:
         """Whether figures have one column of panels."""
-        return self.columns is not None and max(self.columns) < NARROW
+        return self.columns is not None and is_narrow(max(self.columns))
+
+    def pixels(self, inch: float) -> int:
+        """Return the width in pixels of a picture that is `inch` wide in print."""
+        return round(inch * self.dpi) if self.columns else self.screen
+
+    def letter(self, width: int, inch: float) -> float:
+        """Return the pixels of a letter of a picture that is `width` pixels and `inch` wide."""
+        return self.solid_font / 72 * width / inch
 
     def size(self, width: float, height: float) -> tuple[float, float]:
         """Return the size in inches of a figure that has a given size with letters of 10 points."""
@@ -57,6 +71,11 @@ class Style:
             **dict.fromkeys(inks, self.ink),
             **dict.fromkeys(papers, self.paper),
         }
+
+
+def is_narrow(inch: float) -> bool:
+    """Whether a figure of this width has one column of panels."""
+    return inch < 5.0
 
 
 STYLES = {

@@ -35,10 +35,13 @@ def turntable(view: View, frame: int) -> str:
     )  # fmt: skip
 
 
-def motion_lines(frames: Any, period: float) -> tuple[Floats, Complex]:
+def motion_lines(
+    frames: Any, period: float, most: int = 32, negligible: float = 3e-3
+) -> tuple[Floats, Complex]:
     """Return the strongest lines above 0 Hz of motion (t, n) sampled over its period in s.
 
     Frequencies (l,) in Hz ascend; with amplitudes a (l, n) the motion is Re sum a exp(2 pi i f t).
+    There are at most `most` lines, and none is below `negligible` times the strongest.
     """
     count = len(frames)
     lines = 2 / count * np.fft.rfft(np.asarray(frames, np.float64), axis=0)
@@ -46,10 +49,8 @@ def motion_lines(frames: Any, period: float) -> tuple[Floats, Complex]:
         lines[-1] /= 2
     strength = np.abs(lines).max(axis=1)
     strength[0] = 0.0
-    most_lines = 32
-    strongest = np.argsort(-strength)[:most_lines]
-    negligible_line_ratio = 3e-3  # to the strongest line: weaker lines are left out
-    strong = np.sort(strongest[strength[strongest] > negligible_line_ratio * strength.max()])
+    strongest = np.argsort(-strength)[:most]
+    strong = np.sort(strongest[strength[strongest] > negligible * strength.max()])
     return strong / period, lines[strong]
 
 
@@ -57,9 +58,8 @@ def focus_places(pressure: MovingPressure, times: Floats) -> tuple[Floats, Float
     """Return the paths (m, q, 2) and the foci (t, k, 2) at times (t,), in m."""
     tacton, path = pressure.tacton, pressure.tacton.trajectory
     n = tacton.n_paths
-    drawn_points = 121  # of each path
     # No line connects the end of a path to the beginning of the next.
-    along = (np.arange(n)[:, None] + np.linspace(0, 1 - 1e-6, drawn_points)) / n
+    along = (np.arange(n)[:, None] + np.linspace(0, 1 - 1e-6, 121)) / n
     paths = path.at_phase(along) if tacton.drawing_frequency else np.zeros((0, 0, 2))
     within = np.mod(tacton.drawing_frequency * times, 1.0) / n  # each focus stays on its own path
     foci = [path.at_phase((within + phase) % 1) for phase in tacton.foci]

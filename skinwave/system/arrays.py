@@ -16,8 +16,9 @@ def pack(values: np.ndarray) -> Packed:
 
 
 def quantise(values: np.ndarray, bits: int = 16) -> Packed:
-    """Encode real or complex rows (n, m) as integers of 16 or 12 bits relative to the largest of
-    each row. An integer of 12 bits takes two letters of base 64, with 2048 added.
+    """Encode real or complex rows (n, m) as integers of 16 or 12 bits, relative to each row's peak.
+
+    An integer of 12 bits takes two letters of base 64, with 2048 added.
     """
     parts = _parts(values)
     largest = np.maximum(np.abs(parts).reshape(len(values), -1).max(axis=1), 1e-300)

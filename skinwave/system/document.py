@@ -19,16 +19,6 @@ from skinwave.system.failures import failure_text
 from skinwave.system.table import Table
 from skinwave.system.templates import part, render, typeset
 
-# A page may load its own pictures and styles; no network, forms or scripts, except the scripts of
-# an inner page, by their digests.
-POLICY = (
-    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; "
-    "form-action 'none'"
-)
-_INNER = re.compile(r'<iframe [^>"]*"allow-scripts"[^>]* srcdoc="([^"]*)"')
-_SCRIPT = re.compile(r"<script\b[^>]*>(.*?)</script\s*>", re.DOTALL | re.IGNORECASE)
-_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-
 
 @dataclass(frozen=True)
 class Picture:
@@ -42,10 +32,6 @@ class Picture:
     kind: str = "png"
     files: Mapping[str, bytes] = field(default_factory=dict)
 
-    def html(self) -> Markup:
-        """Return the image for a page."""
-        return part("picture", b64encode(self.image).decode(), self.caption, self.name, self.kind)
-
 
 @dataclass(frozen=True)
 class Section:
@@ -55,40 +41,21 @@ class Section:
     parts: "Sequence[Part]"
     level: int = 2
 
-    def html(self) -> Markup:
-        """Return heading and parts for a page."""
-        parts = list(map(_html, self.parts))
-        return part("section", self.heading, self.level, parts, _anchor(self.heading))
-
 
 @dataclass(frozen=True)
 class Details:
     """Parts that a reader can unfold."""
 
-    summary: str
+    heading: str
     parts: "Sequence[Part]"
-
-    def html(self) -> Markup:
-        """Return summary and parts for a page."""
-        return part("details", self.summary, list(map(_html, self.parts)), _anchor(self.summary))
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Parts by name, of which a page shows one at a time; `name` is the name of the choice."""
+    """Parts by name. A page shows one of them at a time, and a button for each."""
 
     name: str
     options: "Mapping[str, Part]"
-
-    @property
-    def parts(self) -> "Sequence[Part]":
-        """All parts."""
-        return list(self.options.values())
-
-    def html(self) -> Markup:
-        """Return a button for each part, and the chosen part."""
-        shown = [(name, _html(each)) for name, each in self.options.items()]
-        return part("choice", self.name, shown) if len(shown) > 1 else shown[0][1]
 
 
 Part = str | Table | Picture | Section | Details | Choice
@@ -98,8 +65,8 @@ Part = str | Table | Picture | Section | Details | Choice
 class Report:
     """A page: title, paragraphs of the verdict, and parts.
 
-    The first sentence names `failures`; warnings of `efforts`, given by name, follow. Pictures are
-    written to the folder `pictures`.
+    The first sentence names the `failures`. Warnings of `efforts`, which have names, follow.
+    Pictures are written to the folder `pictures`.
     """
 
     title: str
@@ -110,13 +77,13 @@ class Report:
     failures: Mapping[str, str] = field(default_factory=dict)
 
     def html(self) -> str:
-        """Return the page with its policy."""
+        """Return the page, with a policy that lets only inner pages run scripts."""
         failed, *verdict = (
             Markup('<p class="verdict">{}</p>').format(typeset(said)) if said else Markup()
             for said in (failure_text(self.failures), *self.verdict)
         )
         parts = (failed, warnings_banner(self.efforts), *verdict, *self.parts)
-        body = Markup("\n").join(map(_html, parts))
+        body = Markup("\n").join(map(html_of, parts))
         return render("page.html", title=self.title, body=body, policy=_policy(body))
 
     def write(self, folder: Path) -> None:
@@ -135,23 +102,37 @@ class Report:
 def _flat(parts: Iterable[Part]) -> Iterator[Part]:
     for each in parts:
         yield each
-        if isinstance(each, Section | Details | Choice):
+        if isinstance(each, Section | Details):
             yield from _flat(each.parts)
+        elif isinstance(each, Choice):
+            yield from _flat(each.options.values())
 
 
-def _html(one: Part) -> Markup:
-    if isinstance(one, Markup):
-        return one
-    return Markup("<p>{}</p>").format(typeset(one)) if isinstance(one, str) else one.html()
+def html_of(one: Part) -> Markup:
+    """Return a part for a page."""
+    match one:
+        case Markup():
+            return one
+        case str():
+            return Markup("<p>{}</p>").format(typeset(one))
+        case Table():
+            return one.html()
+        case Picture():
+            data = b64encode(one.image).decode()
+            return part("picture", data, one.caption, one.name, one.kind)
+        case Choice():
+            shown = [(name, html_of(each)) for name, each in one.options.items()]
+            return part("choice", one.name, shown) if len(shown) > 1 else shown[0][1]
+        case Section():
+            parts = list(map(html_of, one.parts))
+            return part("section", one.heading, one.level, parts, _anchor(one.heading))
+        case Details():
+            return part("details", one.heading, list(map(html_of, one.parts)), _anchor(one.heading))
 
 
 def contents(parts: Iterable[Part]) -> Markup:
     """Return links to the sections and folded parts of a page."""
-    headings = [
-        each.heading if isinstance(each, Section) else each.summary
-        for each in parts
-        if isinstance(each, Section | Details)
-    ]
+    headings = (each.heading for each in parts if isinstance(each, Section | Details))
     return part("contents", [(_anchor(heading), heading) for heading in headings])
 
 
@@ -174,7 +155,7 @@ def preformat(text: str) -> Markup:
 
 
 def warnings_banner(efforts: Iterable[tuple[str, Effort]]) -> Markup:
-    """Return all warnings of named responses for a page; empty without warnings."""
+    """Return the warnings of named responses for a page, empty if there are none."""
     return part("warnings", worst_warnings(efforts))
 
 
@@ -186,29 +167,37 @@ def inner_page(page: str, caption: str) -> Markup:
 def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
     """Return the warnings of some responses, with their names unless all have the same warnings.
 
-    If warnings differ only in numbers, the one with the largest is returned with the number of
+    Of warnings that differ only in numbers, return the one with the largest number, and count the
     others.
     """
-    efforts = list(efforts)
+    efforts, number = list(efforts), re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
     differ = len({tuple(effort.warnings) for _, effort in efforts}) > 1
     alike: dict[str, list[tuple[str, str]]] = {}
     for name, effort in efforts:
         for sentence in effort.warnings:
-            alike.setdefault(_NUMBER.sub("#", sentence), []).append((name, sentence))
+            alike.setdefault(number.sub("#", sentence), []).append((name, sentence))
     found = []
     for group in alike.values():
-        name, sentence = max(group, key=lambda one: [float(x) for x in _NUMBER.findall(one[1])])
+        name, sentence = max(group, key=lambda one: [float(x) for x in number.findall(one[1])])
         of = f"{name}, and {len(group) - 1} more" if len(group) > 1 else name
         found.append(f"{sentence} ({of})" if name and differ else sentence)
     return found
 
 
 def _policy(body: Markup) -> str:
-    """Return the policy of a page."""
+    """Return the policy of a page.
+
+    It may load its own pictures and styles, but nothing from a network, no forms, and no scripts
+    except those of an inner page, by their digests.
+    """
+    policy = (
+        "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; "
+        "form-action 'none'"
+    )
     # Escaped text has no quotes, so that each match is an inner page.
-    inner = (unescape(found) for found in _INNER.findall(body))
-    scripts = [script for page in inner for script in _SCRIPT.findall(page)]
-    if not scripts:
-        return POLICY
+    inner = re.findall(r'<iframe [^>"]*"allow-scripts"[^>]* srcdoc="([^"]*)"', body)
+    script = re.compile(r"<script\b[^>]*>(.*?)</script\s*>", re.DOTALL | re.IGNORECASE)
+    scripts = (each for page in inner for each in script.findall(unescape(page)))
     digests = (b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
-    return f"{POLICY}; script-src " + " ".join(f"'sha256-{digest}'" for digest in digests)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    return f"{policy}; script-src {allowed}" if allowed else policy

@@ -10,7 +10,6 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from threading import Lock
 
-SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # optional
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 Progress = Callable[[str, float], None]  # of a phase and the fraction done
 
@@ -48,7 +47,7 @@ _LOCK, _LIMIT, _WITHIN = Lock(), ExitStack(), [0]
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Limit linear algebra to one thread: in small products threads only wait for each other.
+    """Limit linear algebra to one thread, because in small products threads wait for each other.
 
     The limit applies to the whole process, from the first entry to the last exit.
     """
@@ -71,7 +70,7 @@ def one_thread() -> Iterator[None]:
 def versions() -> dict[str, str]:
     """Return the versions of Python, skinwave, its numerical libraries and the operating system."""
     found = {"python": sys.version.split()[0]}
-    for name in ("skinwave", "numpy", "scipy", *SOLVERS):
+    for name in ("skinwave", "numpy", "scipy", "mkl", "scikit-sparse", "pymetis"):
         with suppress(PackageNotFoundError):
             found[name] = version(name)
     return found | {"os": platform.platform()}
@@ -84,10 +83,7 @@ def usable_cores() -> int:
 
 
 def threads() -> dict[str, str]:
-    """Return the number of threads of linear algebra by environment variable.
-
-    This number affects rounding.
-    """
+    """Return the number of threads of linear algebra, which affects rounding, by variable."""
     usable = os.environ.get(THREADS[0]) or str(usable_cores())
     return {name: os.environ.get(name) or usable for name in THREADS}
 

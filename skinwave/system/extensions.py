@@ -1,7 +1,7 @@
 """Registries, and the modules from outside that add to them in this process and its workers.
 
 A module registers what it adds when it is imported: body kinds, models, formats of measurements and
-patterns, columns of sweeps. Entry points of installed packages in the group `GROUP` name such
+patterns, columns of sweeps. Entry points of installed packages in the group "skinwave" name such
 modules, and so does the environment variable `SKINWAVE_EXTENSIONS`, separated by commas.
 """
 
@@ -13,7 +13,6 @@ from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 VARIABLE = "SKINWAVE_EXTENSIONS"
-GROUP = "skinwave"
 T = TypeVar("T")
 
 
@@ -34,8 +33,9 @@ class Registry(Generic[T]):
 
 
 def add(registry: Registry[T], name: str, record: T, made_by: Callable[..., Any] | None) -> None:
-    """Register a record, and add the module of its function `made_by` to the environment variable;
-    raise a ValueError if the name is taken.
+    """Register a record, and add the module of its function `made_by` to the environment variable.
+
+    Raises a ValueError if the name is taken.
     """
     module = getattr(made_by, "__module__", None) or "skinwave"
     is_own = module.split(".")[0] == "skinwave"
@@ -90,4 +90,4 @@ def _installed() -> list[tuple[str, str]]:
     from importlib.metadata import entry_points
 
     return [(point.module, point.dist.name if point.dist else point.name)
-            for point in entry_points(group=GROUP)]  # fmt: skip
+            for point in entry_points(group="skinwave")]  # fmt: skip

@@ -10,13 +10,10 @@ PLAN = {
     "rows": [{"what": str, "value": str, "reason": str}], "tolerance": float, "warnings": [str],
     "model": str, "misfit?": float,
 }  # fmt: skip
-ERRORS = [{"name": str, "source": str, "error": float | None, "cure": str}]
-_TABLES = {"seconds": {str: float}, "versions": {str: str}, "warnings": [str]}
 EFFORT = {
-    f"{one.name}?": _TABLES.get(one.name, str if isinstance(one.default, str) else float)
-    for one in fields(Effort)
-    if one.name != "errors"
-}
+    f"{one.name}?": str if isinstance(one.default, str) else float
+    for one in fields(Effort) if one.name != "errors"
+} | {"seconds?": {str: float}, "versions?": {str: str}, "warnings?": [str]}  # fmt: skip
 
 
 def fitting(value: Any, pattern: Any, where: str) -> Any:
@@ -39,11 +36,13 @@ def is_finite_number(value: Any) -> bool:
 
 
 def effort_of(table: Any, errors: Any, where: str) -> Effort:
-    """Return the effort in a table of a JSON file, with the `errors` of its record; raise a
-    ValueError for other contents.
+    """Return the effort in a table of a JSON file, with the `errors` of its record.
+
+    Raises a ValueError for other contents.
     """
     fitting(table, EFFORT, where)
-    statement = Statement.of_errors(fitting(errors, ERRORS, where))
+    parts = [{"name": str, "source": str, "error": float | None, "cure": str}]
+    statement = Statement.of_errors(fitting(errors, parts, where))
     if unknown := table.keys() - {key.removesuffix("?") for key in EFFORT}:
         raise ValueError(
             f"{where} has the unknown key {min(unknown)[:40]!r}; compute the result again"

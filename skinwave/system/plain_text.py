@@ -6,8 +6,6 @@ import sys
 from collections.abc import Iterable
 from typing import TextIO
 
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of formulas in spreadsheets
-
 
 def printable(text: str, keep: str = "\n") -> str:
     """Escape control, bidirectional and other invisible characters in a text, like JSON."""
@@ -25,8 +23,8 @@ def say(text: str, file: TextIO | None = None) -> None:
 
 def cell(value: object) -> object:
     """Return a value of a CSV row; text that looks like a formula gets an apostrophe."""
-    is_formula = isinstance(value, str) and value.startswith(FORMULA) and number_in(value) is None
-    return f"'{value}" if is_formula else value
+    begins_formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{value}" if begins_formula and number_in(str(value)) is None else value
 
 
 def csv_table(

@@ -8,7 +8,6 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -35,29 +34,32 @@ def environment(values: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def pool(count: int, threads: int | None = 1, *, renewed: bool = False) -> "Iterator[Executor]":
-    """Start `count` processes, each with `threads` of linear algebra unless the environment sets
-    them; None sets no limit. With `renewed`, each call runs in a new process. Unfinished work is
-    cancelled at the end.
+    """Start `count` processes, and cancel unfinished work at the end.
+
+    Linear algebra uses so many `threads` in each, or those that the environment sets; None sets no
+    limit. With `renewed`, each call runs in a new process.
     """
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
-    begin = partial(begin_worker, threads)
-    with environment(SAFE_PATH), _reserved(count):
+    with environment(SAFE_PATH):
         executor = ProcessPoolExecutor(
-            count, get_context("spawn"), initializer=begin,
+            count, get_context("spawn"), initializer=begin_worker, initargs=(threads,),
             max_tasks_per_child=1 if renewed else None,
         )  # fmt: skip
+        _RESERVED[0] += count
         try:
             yield executor
         finally:
+            _RESERVED[0] -= count
             _end(executor)
 
 
 @contextmanager
 def beside() -> "Iterator[Callable[..., Future[Any]] | None]":
-    """Yield a function that begins a call in a thread, or None if processes of pools, or this one
-    as such a process, have all cores.
+    """Yield a function that begins a call in a thread, or None if no core is free.
+
+    Pools have a core for each process, and a process of a pool has one core.
     """
     from concurrent.futures import ThreadPoolExecutor
     from multiprocessing import parent_process
@@ -71,19 +73,10 @@ def beside() -> "Iterator[Callable[..., Future[Any]] | None]":
         yield thread.submit
 
 
-@contextmanager
-def _reserved(count: int) -> Iterator[None]:
-    _RESERVED[0] += count
-    try:
-        yield
-    finally:
-        _RESERVED[0] -= count
-
-
 def _end(executor: "ProcessPoolExecutor") -> None:
     """Cancel the work of an executor, end its processes, and wait for its own thread.
 
-    That thread may start a process for the next call until it knows that there is none.
+    Until then, that thread may start another process.
     """
     ending = threading.Thread(
         target=executor.shutdown, kwargs={"cancel_futures": True}, daemon=True

@@ -11,9 +11,6 @@ from math import inf, isfinite
 from skinwave.system.effort import Progress, silent
 from skinwave.system.plain_text import printable, say
 
-# Steps in their order, each with its share of the time: between those of a sheet and of a palm.
-STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.20, "reduce": 0.70}
-
 
 @dataclass(frozen=True)
 class _Bar:
@@ -28,9 +25,9 @@ class _Bar:
 
 @contextmanager
 def expecting(progress: Progress, seconds: float | None) -> Iterator[None]:
-    """Tell a bar the predicted seconds of what is done within, if known.
+    """Tell a bar the predicted seconds of the block, if known.
 
-    It counts down from them until a fraction above 0 is reported.
+    The bar counts them down until a fraction above 0 is reported.
     """
     expect = progress.expect if isinstance(progress, _Bar) else lambda seconds: None
     expect(inf if seconds is None else seconds)
@@ -45,33 +42,31 @@ def announce(progress: Progress, phase: str, fraction: float = 0.0) -> None:
 
 
 def step_of(phase: str, fraction: float) -> tuple[str, float]:
-    """Return the phase with the number of its step and the completed share of all steps; for other
-    phases, the share of the phase.
+    """Return a phase with the number of its step, and the completed share of all steps.
+
+    If the phase is none of the steps, return it with its own completed share.
     """
-    names, done = list(STEPS), min(max(fraction, 0.0), 1.0)
-    step = phase.rpartition(": ")[2]
-    step = "reduce" if step == "march" else step
-    if step not in STEPS:
+    # Share of each step in the time, between those of a sheet and of a palm.
+    shares = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.20, "reduce": 0.70}
+    names, done = list(shares), min(max(fraction, 0.0), 1.0)
+    step = phase.rpartition(": ")[2].replace("march", "reduce")
+    if step not in shares:
         return phase, done
     number = names.index(step)
-    done = sum(STEPS[name] for name in names[:number]) + done * STEPS[step]
+    done = sum(shares[name] for name in names[:number]) + done * shares[step]
     return f"{phase} (step {number + 1} of {len(names)})", done
 
 
 @contextmanager
 def progress_callback(progress: Progress | bool | None) -> Iterator[Progress]:
-    """Yield a progress callback: a bar for True, none for False or None, or the given function."""
-    if progress is True:
-        with bar() as report:
-            yield report
-    else:
-        yield progress or silent
+    """Yield a progress callback: the given function, none for False or None, and for True a bar.
 
-
-@contextmanager
-def bar() -> Iterator[Progress]:
-    """Yield a callback that shows a bar on a terminal, and otherwise a line for each step."""
+    If standard error is not a terminal, a line for each step replaces the bar.
+    """
     last = ("", 0.0)
+    if progress is not True:
+        yield progress or silent
+        return
     if not sys.stderr.isatty():
 
         def log(phase: str, fraction: float) -> None:
@@ -91,7 +86,7 @@ def bar() -> Iterator[Progress]:
     begun, end, is_expected = time.monotonic(), inf, False  # of the phase, in s
 
     class Fill(rich.BarColumn):
-        """Completed share; of a phase that reports none, by its expected seconds."""
+        """Completed share. A phase that reports none fills the bar by its expected seconds."""
 
         def render(self, task: rich.Task) -> ProgressBar:
             filled = super().render(task)
@@ -100,7 +95,7 @@ def bar() -> Iterator[Progress]:
             return filled
 
     class Remaining(rich.ProgressColumn):
-        """Time until the expected end, or until that which the completed share suggests."""
+        """Time until the end that is expected, or that the completed share suggests."""
 
         def render(self, task: rich.Task) -> Text:
             left = max(0.0, end - time.monotonic())

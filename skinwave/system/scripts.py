@@ -15,12 +15,6 @@ _EXPORT = re.compile(
     r"^export\s+((?:async\s+)?function\s*\*?\s*|class\s+|const\s+)([\w$]+)", re.MULTILINE
 )
 _NAME = re.compile(r"([\w$]+)(?:\s+as\s+([\w$]+))?")
-# Imports and exports of other forms, and text that ends the script of the page.
-_REFUSED = re.compile(
-    r'^(?:import\s*(?:[{*"\']|[\w$]+\s*(?:,|from\b))|export\b).*|\bimport\s*\(\s*["\'`].*'
-    r"|\bimport\.meta\b.*|(?i:</script)|<!--",
-    re.MULTILINE,
-)
 
 
 def json_for_script(data: Mapping[str, Any]) -> str:
@@ -66,7 +60,12 @@ def _as_function(name: str, source: str, exports: set[str]) -> str:
         return f"const {{ {', '.join(pairs)} }} = {_variable(found[2])};"
 
     body = _EXPORT.sub(r"\1\2", _IMPORT.sub(unpacked, source))
-    if found := _REFUSED.search(body):
+    # Imports and exports of other forms, and text that ends the script of the page.
+    refused = (
+        r'^(?:import\s*(?:[{*"\']|[\w$]+\s*(?:,|from\b))|export\b).*|\bimport\s*\(\s*["\'`].*'
+        r"|\bimport\.meta\b.*|(?i:</script)|<!--"
+    )
+    if found := re.search(refused, body, re.MULTILINE):
         raise ValueError(
             f"{name}: '{found[0].strip()}' is not supported; import and export by name "
             "at the start of a line, and split text that ends a script"

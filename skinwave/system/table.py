@@ -13,13 +13,11 @@ from simple_model.numbers import significant
 from skinwave.system.plain_text import csv_table
 from skinwave.system.templates import part
 
-STORED = 6  # significant digits of numbers in CSV files
-
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its `name` in CSV and JSON, such as "frequency_hz"; for pages its `heading`, by
-    default the name, unit and significant digits.
+    """A column: its `name` in CSV and JSON, such as "frequency_hz". Pages show its `heading`, which
+    is the name by default, its unit, and a number of significant digits.
     """
 
     name: str
@@ -37,8 +35,8 @@ class Column:
 class Table:
     """Columns, each a `Column` or a name, and rows of text, `Markup`, numbers or None (no value).
 
-    With a `name`, the table is also written as a CSV file next to the page, with `stored`
-    significant digits.
+    A table with a `name` is also written next to the page as a CSV file, whose numbers have
+    `stored` significant digits.
 
     >>> table = Table([Column("f_hz", "frequency", "Hz"), "line"], [(127.38, "f_d"), (None, "2 f")])
     >>> table.to_csv()
@@ -52,24 +50,24 @@ class Table:
 
     def __init__(
         self, columns: Iterable[Column | str], rows: Iterable[Sequence[Any]], name: str = "",
-        stored: int = STORED,
+        stored: int = 6,
     ) -> None:  # fmt: skip
-        known = (c if isinstance(c, Column) else Column(c) for c in columns)
-        object.__setattr__(self, "columns", tuple(known))
-        object.__setattr__(self, "rows", tuple(map(tuple, rows)))
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "stored", stored)
+        known = tuple(c if isinstance(c, Column) else Column(c) for c in columns)
+        vars(self).update(columns=known, rows=tuple(map(tuple, rows)), name=name, stored=stored)
 
     def only(self, *names: str, most: int | None = None) -> "Table":
-        """Return a table with some columns and at most `most` rows."""
+        """Return a table with the named columns and at most `most` rows."""
         at = [[column.name for column in self.columns].index(name) for name in names]
-        at = at or list(range(len(self.columns)))
         rows = ([row[k] for k in at] for row in self.rows[:most])
         return Table([self.columns[k] for k in at], rows)
 
     def to_csv(self) -> bytes:
         """Return a CSV file in UTF-8; a cell without a value is empty."""
-        rows = ([_csv_value(value, self.stored) for value in row] for row in self.rows)
+
+        def stored(value: Any) -> Any:
+            return f"{value:.{self.stored}g}" if isinstance(value, float) else value
+
+        rows = ([stored(v) if _is_known(v) else None for v in row] for row in self.rows)
         return csv_table((column.name for column in self.columns), rows)
 
     def to_json(self) -> str:
@@ -105,9 +103,3 @@ def _is_numeric(rows: Sequence[Sequence[str]], k: int) -> bool:
 
 def _is_known(value: Any) -> bool:
     return value is not None and (not isinstance(value, float) or isfinite(value))
-
-
-def _csv_value(value: Any, digits: int) -> Any:
-    if not _is_known(value):
-        return None
-    return f"{value:.{digits}g}" if isinstance(value, float) else value

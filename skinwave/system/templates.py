@@ -6,31 +6,26 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-NARROW, FIXED, MINUS = "\u202f", "\u00a0", "\u2212"  # spaces without a line break; minus sign
-TIMES = f"{FIXED}\u00d7{FIXED}"
-_UNITS = "dB|%|°C|GiB|MiB|[cknµm]?m|[nµm]?s|[kMG]?Hz|[kMG]?Pa|N|rad|kg|times|degrees|inch"
-_OPTION = re.compile(r"((?<![\w-])--[a-z][a-z-]*(?:[ =]-?\d+(?:[.:]\d+)*)?)")
-# Symbols in escaped text, and their markup.
-_SYMBOLS = [
-    (re.compile(symbol), written)
-    for symbol, written in (
-        (r"\b(\d+(?:\.\d+)?)e-0*(\d+)\b", rf"\1{TIMES}10<sup>{MINUS}\2</sup>"),
-        (r"\b(\d+(?:\.\d+)?)e\+0*(\d+)\b", rf"\1{TIMES}10<sup>\2</sup>"),
-        (r"(?<![\w.)/:=-])-(?=\.?\d|[xyz]\b)", MINUS),
-        (r"(?<=\d) x (?=\d)", " \u00d7 "),
-        (r"(\([^ ()]+,) (?=[^ ()]+\))", rf"\1{FIXED}"),
-        (r"\^2\b", "²"),
-        (r"\^3\b", "³"),
-        (r"\bum\b", "µm"),
-        (r"\bnu\b", "\u03bd"),
-        (rf"(?<=[\d>)]) (?=(?:{_UNITS})(?!\w))", FIXED),
-        (r"\bPa s\b", f"Pa{FIXED}s"),
-        (r"(?<=f_d|_AM|AM2|f_e)-(?=\d* ?f_)", f"{NARROW}{MINUS}{NARROW}"),
-        (r"(?<=f_d|_AM|AM2|f_e)\+(?=\d* ?f_)", f"{NARROW}+{NARROW}"),
-        (r"\b(\d+|n) ?(?=f_(?:AM2?|[de])\b)", rf"\1{NARROW}"),
-        (r"\b([fc])_(AM2?|[deRps])\b", r"\1<sub>\2</sub>"),
-    )
-]
+_OPTION = r"((?<![\w-])--[a-z][a-z-]*(?:[ =]-?\d+(?:[.:]\d+)*)?)"
+_UNIT = "dB|%|°C|GiB|MiB|[cknµm]?m|[nµm]?s|[kMG]?Hz|[kMG]?Pa|N|rad|kg|times|degrees|inch"
+# Symbols in escaped text, and their markup; lines do not break at the spaces U+00A0 and U+202F.
+_SYMBOLS = {
+    r"\b(\d+(?:\.\d+)?)e-0*(\d+)\b": "\\1\u00a0\u00d7\u00a010<sup>\u2212\\2</sup>",
+    r"\b(\d+(?:\.\d+)?)e\+0*(\d+)\b": "\\1\u00a0\u00d7\u00a010<sup>\\2</sup>",
+    r"(?<![\w.)/:=-])-(?=\.?\d|[xyz]\b)": "\u2212",
+    r"(?<=\d) x (?=\d)": " \u00d7 ",
+    r"(\([^ ()]+,) (?=[^ ()]+\))": "\\1\u00a0",
+    r"\^2\b": "²",
+    r"\^3\b": "³",
+    r"\bum\b": "µm",
+    r"\bnu\b": "\u03bd",
+    rf"(?<=[\d>)]) (?=(?:{_UNIT})(?!\w))": "\u00a0",
+    r"\bPa s\b": "Pa\u00a0s",
+    r"(?<=f_d|_AM|AM2|f_e)-(?=\d* ?f_)": "\u202f\u2212\u202f",
+    r"(?<=f_d|_AM|AM2|f_e)\+(?=\d* ?f_)": "\u202f+\u202f",
+    r"\b(\d+|n) ?(?=f_(?:AM2?|[de])\b)": "\\1\u202f",
+    r"\b([fc])_(AM2?|[deRps])\b": r"\1<sub>\2</sub>",
+}
 
 
 def render(template: str, **values: object) -> str:
@@ -46,22 +41,22 @@ def part(name: str, *values: object) -> Markup:
 
 
 def typeset(text: str) -> Markup:
-    """Escape text and typeset its numbers and symbols, and options of commands as code; `Markup`
-    stays the same.
+    """Escape text, typeset its numbers and symbols, and mark options of commands as code.
+
+    `Markup` stays the same.
     """
     if isinstance(text, Markup):
         return text
     # Every second piece is an option.
-    pieces = _OPTION.split(str(escape(text)))
-    pieces[1::2] = [f"<code>{option}</code>" for option in pieces[1::2]]
-    pieces[::2] = map(_with_symbols, pieces[::2])
+    pieces = re.split(_OPTION, str(escape(text)))
+    for k, piece in enumerate(pieces):
+        if k % 2:
+            pieces[k] = f"<code>{piece}</code>"
+            continue
+        for symbol, written in _SYMBOLS.items():
+            piece = re.sub(symbol, written, piece)
+        pieces[k] = piece
     return Markup("".join(pieces))
-
-
-def _with_symbols(text: str) -> str:
-    for symbol, written in _SYMBOLS:
-        text = symbol.sub(written, text)
-    return text
 
 
 @cache

@@ -23,7 +23,7 @@ from skinwave.studies.relax import Hierarchy, HierarchyStep
 from skinwave.studies.tradeoff import Candidate, Tradeoff
 from skinwave.studies.tradeoff import Result as TradeoffResult
 from skinwave.system import document
-from skinwave.system.document import Details, Markup, Picture, Report, Section
+from skinwave.system.document import Details, Markup, Picture, Report, Section, html_of
 from skinwave.system.table import Table
 from skinwave.verify import suite
 from skinwave.verify.case import Case, Check, Result
@@ -189,9 +189,9 @@ def test_only_markup_of_templates_is_not_escaped():
     assert "<td>&lt;b&gt;1&lt;/b&gt;</td><td><b>2</b></td><td><i>&lt;b&gt;</i></td>" in made
     assert '<td class="number">\u22121\u00a0\u00d7\u00a010<sup>3</sup></td>' in made
     for made in (
-        Report("<t>", ["<p>"]).html(), Section("<t>", ["<p>"]).html(),
-        Details("<t>", ["<p>"]).html(), Table(["<t>"], [["<p>"]]).html(),
-        Picture(b"", "<p>\"'", '<t>"').html(), document.inner_page("<p>", "<t>"),
+        Report("<t>", ["<p>"]).html(), html_of(Section("<t>", ["<p>"])),
+        html_of(Details("<t>", ["<p>"])), Table(["<t>"], [["<p>"]]).html(),
+        html_of(Picture(b"", "<p>\"'", '<t>"')), document.inner_page("<p>", "<t>"),
         document.preformat("<p><t>"),
         document.warnings_banner([("<t>", Effort(warnings=("<p>",))), ("", Effort())]),
     ):  # fmt: skip

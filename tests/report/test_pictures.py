@@ -189,7 +189,7 @@ def test_motion_is_exaggerated_as_stated(seen):
     said = re.search(r"exaggerated ([\d,]+) times", render.scale_text(view))
     assert said
     assert factor == pytest.approx(float(said[1].replace(",", "")), rel=1e-3)
-    assert 0.015 < factor * view.peak / 0.1 <= render.LARGEST_DRAWN
+    assert 0.015 < factor * view.peak / 0.1 <= 0.06
     assert render.scale_text(seen["point-kernel"]) == "pressure, no motion"
 
 
@@ -278,7 +278,7 @@ def test_a_body_beside_the_origin_is_cut_open_at_its_middle():
 def test_the_section_of_a_body_has_the_colours_of_its_legend(scene):
     small = replace(scene, body=LAYERED, probes=((0.0, 0.0), (0.01, 0.0)))
     pixels = body_picture.body_picture(small)
-    assert pixels.shape[1] == render.WIDTH
+    assert pixels.shape[1] == style("report").screen
     printed = body_picture.body_picture(small, style("print"))
     assert printed.shape[1] == 7 * 300
     for colour in body_picture.REGIONS[:2]:
@@ -325,7 +325,7 @@ def test_a_film_may_be_an_mp4(seen, tmp_path):
     films.film(path, [seen["skin-slab"]], style("report"), panel=(160, 144))
     with imageio.get_reader(path) as film:
         assert sum(1 for _ in film) == 12
-        assert film.get_meta_data()["fps"] == pytest.approx(12 / films.SHORTEST)
+        assert film.get_meta_data()["fps"] == pytest.approx(12 / 4.0)  # in 4 s at least
     gc.collect()
 
 
