@@ -147,7 +147,7 @@ def summary(result: Fit) -> dict[str, Any]:
         "kind": data.kind,
         "converged": solution.converged,
         "values": result.values,
-        "estimates": json.loads(estimate_table(result).to_json()),
+        "estimates": estimate_table(result).records(),
         "unresolved": [list(keys) for keys in result.intervals.unresolved],
         "chi_squared": solution.cost,
         "degrees_of_freedom": solution.dof,

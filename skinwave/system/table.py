@@ -1,6 +1,5 @@
 """A table of a result: one definition for pages, CSV files and JSON."""
 
-import json
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -70,11 +69,11 @@ class Table:
         rows = ([stored(v) if _is_known(v) else None for v in row] for row in self.rows)
         return csv_table((column.name for column in self.columns), rows)
 
-    def to_json(self) -> str:
-        """Return a JSON list with an object for each row; null for no value."""
+    def records(self) -> list[dict[str, Any]]:
+        """Return each row by the names of the columns, for JSON; None for no value."""
         names = [column.name for column in self.columns]
         rows = ([value if _is_known(value) else None for value in row] for row in self.rows)
-        return json.dumps([dict(zip(names, row, strict=True)) for row in rows])
+        return [dict(zip(names, row, strict=True)) for row in rows]
 
     def html(self) -> Markup:
         """Return the table for a page; "-" where there is no value."""

@@ -18,7 +18,7 @@ from simple_model.load.spectrum import load_lines
 from skinwave.typing import Array
 from skinwave.verify import references
 from skinwave.verify.case import Checks, below, case, misfit, relative
-from skinwave.verify.setups import FOREARM, HANKEL, PAPER, THICKNESS, WIDTH, ZENER
+from skinwave.verify.setups import FOREARM, PAPER, SOURCES, THICKNESS, WIDTH, lossy_paper
 
 Kernel = Callable[[Array], Array]
 RADII = np.array([0, 5, 10, 15, 20, 30]) * 1e-3
@@ -26,7 +26,7 @@ FREQUENCIES = np.array([20.0, 80.0, 140.0, 191.0, 210.0])  # Hz
 SKIN = fem.Material(**FOREARM, poisson=0.49)
 
 
-@case(f"Boussinesq's and Lamb's kernels; {HANKEL}; Gradshteyn and Ryzhik, 6.618.1; {ZENER}")
+@case(f"{SOURCES['Boussinesq']}; {SOURCES['Lamb']}; {SOURCES['Hankel']}; {SOURCES['Zener']}")
 def exact_half_space() -> Checks:
     """Wavenumber integral (flat-body): focus on a half-space."""
     poissons = (0.0, 0.3, 0.49, 0.5)
@@ -52,7 +52,7 @@ def exact_half_space() -> Checks:
     yield misfit("standard linear solid, 20 to 210 Hz, relative L2", ours, exact, 1e-4, "um")
 
 
-@case(f"Cremer, Heckl and Petersson, Structure-Borne Sound (2005); {HANKEL}")
+@case(f"Cremer, Heckl and Petersson, Structure-Borne Sound (2005); {SOURCES['Hankel']}")
 def exact_sheet() -> Checks:
     """Wavenumber integral (flat-body): focus on paper in air."""
     hz = FREQUENCIES[1:]
@@ -135,13 +135,8 @@ def circling_on_skin() -> Checks:
 )
 def circling_on_paper() -> Checks:
     """Circling focus on a lossy sheet: finite elements against the wavenumber integral."""
-    thickness, lag = 0.5e-3, 6e-4
-    stiffness, mass = PAPER.values()
-    young = 12 * stiffness * 0.91 / thickness**3
-    solid = fem.Material(
-        density=mass / thickness, shear_modulus=young / 2.6, poisson=0.3,
-        viscosity=lag * young / 2.6,
-    )  # fmt: skip
+    thickness = 0.5e-3
+    solid = lossy_paper(thickness, lag=6e-4)
     grading = meshes.Grading(radius=0.025, growth=1.25, coarsest=0.013)
     across = meshes.graded_axis(0.2, 0.0021, grading)
     mesh = meshes.extrude(across, across, [-thickness, 0])

@@ -15,13 +15,13 @@ from skinwave.models.reduced import ReducedBody, answer, reduce_scene
 from skinwave.scene.scene import STILL, Body, Scene
 from skinwave.typing import Floats
 from skinwave.verify.case import Checks, below, case, relative
-from skinwave.verify.setups import push, read
+from skinwave.verify.setups import SOURCES, push, read
 
-BODY = Body(width=0.06, height=0.06, depth=0.015, sides="clamped")
-PROBES = ((0.0, 0.0), (0.01, 0.0))
-H = 5e-3  # m
+SCENE = Scene(
+    pressure=MovingPressure(tacton=Tacton(), drive="linear"), probes=((0.0, 0.0), (0.01, 0.0)),
+    body=Body(width=0.06, height=0.06, depth=0.015, sides="clamped"),
+)  # fmt: skip
 MESH = "skin, 60 x 60 x 15 mm, elements of 5 mm"
-POINT = MovingPressure(tacton=Tacton(), drive="linear")
 LIMITS = "limit of the linear equation of motion: Graff, Wave Motion in Elastic Solids (1975)"
 
 
@@ -29,7 +29,7 @@ LIMITS = "limit of the linear equation of motion: Graff, Wave Motion in Elastic 
 def focus_speeds() -> Checks:
     """Focus speeds from 0.01 to 100 m/s (Mach 0.002 to 20)."""
     path = Trajectory(shape="circle", size=0.02, speed=1.0)
-    pressure = MovingPressure(tacton=Tacton(trajectory=path), drive="linear")
+    pressure = replace(SCENE.pressure, tacton=Tacton(trajectory=path))
     rest = _static(pressure, 1)[1]  # the path starts at the second probe
     peak = _response(6.3, speed=0.01).displacement[60000:, 1].max()
     yield relative("0.01 m/s: peak under the focus, over rest", peak, rest, 0.02, "m")
@@ -46,12 +46,12 @@ def focus_speeds() -> Checks:
 @case(f"{LIMITS}: a slow load is quasi-static, a fast one is in its steady state", mesh=MESH)
 def modulation_frequencies() -> Checks:
     """Amplitude modulation from 1 Hz to 1 kHz."""
-    slow, rest = lines(_response(4.0, am=1.0), [1.0])[0], _static(POINT, 1)
-    for k, (x, _) in enumerate(PROBES):
+    slow, rest = lines(_response(4.0, am=1.0), [1.0])[0], _static(SCENE.pressure, 1)
+    for k, (x, _) in enumerate(SCENE.probes):
         yield relative(f"1 Hz: amplitude at {1e3 * x:g} mm", slow[k], rest[k], 0.005, "m")
     fast = lines(_response(0.5, am=1000.0), [1000.0])[0, 0]
     made, ops = _mesh()
-    force = push(made.mesh, lambda x: POINT(x[:, :2], 0.0))
+    force = push(made.mesh, lambda x: SCENE.pressure(x[:, :2], 0.0))
     u = read(made.mesh, fem.harmonic(ops, force, 1000.0)[0], 0.0)
     yield relative("1 kHz: amplitude at the focus", fast, abs(u[0]), 0.005, "m")
 
@@ -67,7 +67,7 @@ def narrow_focus() -> Checks:
     fine = np.linspace(-0.03, 0.03, 1201)
     grid = np.column_stack([axis.ravel() for axis in np.meshgrid(fine, fine)])
     for height, h in ((0.2, 2.9e-3), (0.02, 2.9e-3), (0.02, 5e-3)):
-        load = replace(POINT, height=height)
+        load = replace(SCENE.pressure, height=height)
         exact = load(grid, 0.0).sum() * (fine[1] - fine[0]) ** 2
         places = [(x, x / 2) for x in (0.0, 0.6e-3, 1.2e-3, 1.8e-3, 2.4e-3)]
         worst = np.abs(_forces(load, h, places) / exact - 1).max()
@@ -82,13 +82,11 @@ def degenerate_paths() -> Checks:
     circle = _response(0.1, am=140.0, speed=5.0, size=0.0).displacement
     difference = np.abs(circle - rest).max() / np.abs(rest).max()
     yield below("circle of 0 mm and point: difference", difference, 1e-12)
-    middle, rim = _forces(POINT, 2.9e-3, [(0.0, 0.0), (0.03, 0.0)])
+    middle, rim = _forces(SCENE.pressure, 2.9e-3, [(0.0, 0.0), (0.03, 0.0)])
     yield relative("force on the rim over force in the middle", rim / middle, 0.5, 0.01)
 
 
-@case(
-    "conservation of energy: Hughes, The Finite Element Method (1987), chapter 9", mesh=MESH
-)  # fmt: skip
+@case(f"conservation of energy: {SOURCES['Hughes']}", mesh=MESH)
 def durations() -> Checks:
     """Durations of one sample and of ten seconds."""
     short, long = _response(1e-4, am=140.0), _response(10.0, am=140.0)
@@ -107,13 +105,12 @@ def durations() -> Checks:
 
 @cache
 def _prepare() -> ReducedBody:
-    still = Scene(pressure=STILL, body=BODY, probes=PROBES)
-    return reduce_scene(still, SolveOptions(h=H), reduction=1e-4)
+    return reduce_scene(replace(SCENE, pressure=STILL), SolveOptions(h=5e-3), reduction=1e-4)
 
 
 @cache
 def _mesh() -> tuple[Build, fem.Operators]:
-    made = build(BODY, H)
+    made = build(SCENE.body, 5e-3)
     return made, operators(made)
 
 
@@ -123,7 +120,7 @@ def _static(pressure: MovingPressure, count: int) -> Floats:
     centres = pressure.tacton.trajectory.at_phase(np.arange(count) / count)
     gain = float(pressure.gain(np.zeros(1))[0])
     force = push(made.mesh, lambda x: pressure.spot(x[:, :2], centres).mean(axis=0) * gain)
-    return fem.probe_operator(made.mesh, PROBES) @ fem.static(ops, force)
+    return fem.probe_operator(made.mesh, SCENE.probes) @ fem.static(ops, force)
 
 
 def _response(
@@ -132,13 +129,12 @@ def _response(
     """Return the response to a focus at rest, or on a circle if a speed is given."""
     path = Trajectory(shape="circle", size=size, speed=speed) if speed else Trajectory()
     tacton = Tacton(am_frequency=am, duration=duration, trajectory=path)
-    pressure = MovingPressure(tacton=tacton, drive="linear")
-    return answer(_prepare(), Scene(pressure=pressure, body=BODY, probes=PROBES))
+    return answer(_prepare(), replace(SCENE, pressure=replace(SCENE.pressure, tacton=tacton)))
 
 
 def _forces(load: MovingPressure, h: float, places: Sequence[tuple[float, float]]) -> Floats:
     """Return downward forces (n,) in N with the focus at places of a body with a free rim."""
-    mesh = build(replace(BODY, sides="free"), h).mesh
+    mesh = build(replace(SCENE.body, sides="free"), h).mesh
     P, points = fem.pressure_operator(mesh), fem.facet_points(mesh)[:, :2]
     pressure = load.spot(points, np.array(places)) * float(load.gain(np.zeros(1))[0])
     return -np.asarray((P @ pressure.T).reshape(-1, 3, len(places))[:, 2].sum(axis=0))

@@ -17,10 +17,9 @@ from skinwave.scene.scene import BODIES, Scene
 from skinwave.verify.case import Checks, below, case, misfit, relative
 from skinwave.verify.references import elastica as elastica_tip
 from skinwave.verify.references import karman_disc
+from skinwave.verify.setups import SOURCES
 
-PAPER = BODIES["paper-sheet-loose"]
-BONET = "Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (1997)"
-TIMOSHENKO = "Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells (1959), chapter 13"
+SHEET = BODIES["paper-sheet-loose"]
 
 
 @case(
@@ -49,14 +48,15 @@ def elastica() -> Checks:
 
 
 @case(
-    f"von Karman's equations: {TIMOSHENKO}; Way, Trans ASME 56:627 (1934)",
+    "von Karman's equations: Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells (1959), "
+    "chapter 13; Way, Trans ASME 56:627 (1934)",
     mesh="a quarter, 16 rings, one cell thick, thickness / radius = 0.04",
     note="The approximate formula w + 0.488 w^3 / h^2 = q a^4 / 64 D (Timoshenko, chapter 13) "
     "gives 0.774 and 1.86, which is 2.1 % and 5.2 % above the solution of the equations.",
 )
 def clamped_disc() -> Checks:
     """Clamped disc with an immovable edge, deflected by up to 1.8 thicknesses."""
-    radius, paper, meshed = 0.05, replace(PAPER.solid, loss_factor=0.0), 2e-3
+    radius, paper, meshed = 0.05, replace(SHEET.solid, loss_factor=0.0), 2e-3
     mesh = quarter_disc(radius, meshed, 16)
     P, S = fem.pressure_operator(mesh), fem.probe_operator(mesh, [[0, 0]])
     for name, thickness in (("solid", meshed), ("equivalent of 0.1 mm", 1e-4)):
@@ -78,8 +78,8 @@ def clamped_disc() -> Checks:
 
 
 @case(
-    f"{BONET}, chapters 3 and 7: E = (F^T F - 1) / 2 = 0 under rotation, consistent linearisation; "
-    "central differences",
+    "Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (1997), chapters 3 "
+    "and 7: E = (F^T F - 1) / 2 = 0 under rotation, consistent linearisation; central differences",
     mesh="block of 2 by 2 by 1 cells, displaced at random; with 10 nodes also a membrane inside",
 )
 def tangent() -> Checks:
@@ -107,14 +107,14 @@ def tangent() -> Checks:
 
 
 @case(
-    "Hughes, The Finite Element Method (1987), chapter 9: average acceleration conserves the "
-    "energy of a linear body, and of a nonlinear one to second order in the step",
+    f"{SOURCES['Hughes']}: average acceleration conserves the energy of a linear body, and of a "
+    "nonlinear one to second order in the step",
     mesh="4 by 4 by 1 cells, no loss; steps of 0.1 ms",
 )
 def free_energy() -> Checks:
     """Free oscillation of a sheet released from three thicknesses, 800 steps."""
-    lossless = replace(PAPER, material=replace(PAPER.solid, loss_factor=0.0))
-    made = meshed_sheet(lossless, min(PAPER.width, PAPER.height) / 4)
+    lossless = replace(SHEET, material=replace(SHEET.solid, loss_factor=0.0))
+    made = meshed_sheet(lossless, min(SHEET.width, SHEET.height) / 4)
     mesh, body = made.mesh, stretching_body(lossless, made)
     P, S = fem.pressure_operator(mesh), fem.probe_operator(mesh, [[0, 0]])
     # 6 Pa deflect the coarse sheet by three thicknesses.
@@ -124,7 +124,7 @@ def free_energy() -> Checks:
     energies = [fem.mechanical_energy(body, s) for s in islice(states, steps + 1)]
     drift = np.array(energies) / energies[0] - 1
     late = np.abs(drift[-steps // 4 :].mean() - drift[: steps // 4].mean())
-    yield relative("released from, w / h", (S @ u)[0] / PAPER.depth, 3.0, 0.05)
+    yield relative("released from, w / h", (S @ u)[0] / SHEET.depth, 3.0, 0.05)
     yield below("largest change of energy, relative", np.abs(drift).max(), 0.01)
     yield below("drift from the first to the last quarter", late, 0.01)
 
@@ -138,7 +138,7 @@ def modes_or_all() -> Checks:
     """Sheet in its bending modes against all of its degrees of freedom."""
     tacton = Tacton(am_frequency=140.0, duration=0.02)
     pressure = MovingPressure(tacton=tacton, drive="pressure_squared")
-    small = replace(PAPER, width=0.06, height=0.06)
+    small = replace(SHEET, width=0.06, height=0.06)
     scene = Scene(pressure=pressure, body=small, probes=((0.0, 0.0), (0.01, 0.005)))
     modes, full = (
         compute(scene, model, h=small.width / 8)

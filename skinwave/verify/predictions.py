@@ -1,7 +1,7 @@
 """Predictions of published quantities by presets for skin."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from math import inf
 from pathlib import Path
@@ -30,7 +30,21 @@ BODIES: Mapping[str, Body] = {
        for name in ("forearm", "palm", "palm-stiff")},
     **{name: PRESETS[name] for name in ("skin-slab", "palm-layers", "forearm-layers")},
 }  # fmt: skip
-GRID = np.arange(10.0, 701.0, 10.0)  # Hz: fine enough to track modes
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Samples:
+    """Frequencies in Hz, fine enough to track modes, and speeds in m/s of a focus on circles.
+
+    The circles have two perimeters in m, to separate effects of speed and of frequency.
+    """
+
+    frequencies: Floats = field(default_factory=lambda: np.arange(10.0, 701.0, 10.0))
+    speeds: Floats = field(default_factory=lambda: np.arange(1.0, 16.1, 0.5))
+    perimeters: tuple[float, ...] = (0.100, 0.060)
+
+
+USUAL = Samples()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,13 +65,13 @@ class Curves:
         return np.where((f == 0) & (quantity is not SPEED) & np.isfinite(values), inf, values)
 
 
-def leading_wave(body: Body, grid: ArrayLike | None = None) -> Curves:
-    """Return the wave of a body that moves the surface most at the edge of the focal spot's main
-    lobe, at ascending frequencies (f,) in Hz (default `GRID`), for half-spaces also at rest.
+def leading_wave(body: Body, frequencies: Floats = USUAL.frequencies) -> Curves:
+    """Return the wave that moves the surface of a body most at the edge of the main lobe.
+
+    It is at ascending frequencies (f,) in Hz, and at rest if the body is a half-space.
     """
-    slowest_hz = 1e-3  # Hz, in place of 0, for the static speed of a half-space
-    at_rest = [slowest_hz] if body.depth == inf else []
-    f = np.array([*at_rest, *np.asarray(GRID if grid is None else grid)])
+    slowest = 1e-3  # Hz, in place of 0, for the static speed of a half-space
+    f = np.array([*[slowest] * (body.depth == inf), *frequencies])
     modes = dispersion(body, f, 6).modes
     amplitudes = np.array([_amplitude(mode) for mode in modes])
     if len(modes) == 1:  # the Rayleigh wave leads however strongly it decays
@@ -67,7 +81,7 @@ def leading_wave(body: Body, grid: ArrayLike | None = None) -> Curves:
         np.where(propagates, np.array(values)[first, np.arange(len(f))], np.nan)
         for values in ([m.phase_speed for m in modes], [m.decay_length for m in modes])
     )
-    f = np.where(f == slowest_hz, 0.0, f)
+    f = np.where(f == slowest, 0.0, f)
     return Curves(frequencies=f, mode=first, speed=speed, length=length)
 
 
@@ -80,20 +94,17 @@ def _amplitude(mode: Mode) -> Floats:
 
 
 def decay_exponents(body: Body, frequencies: ArrayLike) -> Floats:
-    """Return exponents n (f,) of distance^-n fitted to the motion around a focus at rest."""
-    fit_range = (0.010, 0.040)  # m from the focus, over which an exponent is fitted
-    r, w = np.geomspace(*fit_range, 12), 2 * np.pi * np.asarray(frequencies)
+    """Return exponents n (f,) of distance^-n fitted to the motion 10 to 40 mm from a focus."""
+    r, w = np.geomspace(0.010, 0.040, 12), 2 * np.pi * np.asarray(frequencies)
     motion = point_response(compliance(body), r, w, spot_width(NOMINAL_HEIGHT))
     return -np.polyfit(np.log(r), np.log(np.abs(motion)).T, 1)[0]
 
 
-BLUR = 0.1  # width of the edge of a disc over its radius; lowers the mean displacement by 1.3 %
-LARGE_CONTACTOR = 2.9e-4  # m2, of the threshold
+def disc_compliance(body: Body, area: float, frequencies: ArrayLike, blur: float = 0.1) -> Complex:
+    """Return the mean displacement per force (f,) in m/N of a disc that presses uniformly.
 
-
-def disc_compliance(body: Body, area: float, frequencies: ArrayLike) -> Complex:
-    """Return the mean displacement per force (f,) in m/N of a disc with an area in m2 that presses
-    uniformly, at frequencies (f,) in Hz.
+    The area is in m2, frequencies (f,) are in Hz. The edge of the disc is `blur` times its radius
+    wide, which lowers the mean by 1.3 %.
 
     It is the mean of the response at a distance s over all pairs of points of the disc. With
     x = s / 2a, s has the density (8 x / pi a) (arccos x - x sqrt(1 - x^2)).
@@ -102,46 +113,46 @@ def disc_compliance(body: Body, area: float, frequencies: ArrayLike) -> Complex:
     nodes, weights = np.polynomial.legendre.leggauss(32)
     x = (nodes + 1) / 2
     density = 8 * x / np.pi * (np.arccos(x) - x * np.sqrt(1 - x**2))  # of s/a
-    w, width = 2 * np.pi * np.asarray(frequencies), BLUR * radius
+    w, width = 2 * np.pi * np.asarray(frequencies), blur * radius
     response = point_response(compliance(body), 2 * radius * x, w, width)
     return response @ (weights * density) / (2 * np.pi * width**2)
 
 
-def threshold_force(body: Body, area: float, frequencies: ArrayLike) -> Floats:
+def threshold_force(
+    body: Body, area: float, frequencies: ArrayLike, contactor: float = 2.9e-4
+) -> Floats:
     """Return the force (f,) in N, on and off as a square wave, that is just felt through a disc.
 
-    The threshold rises by 3 dB for each halving of the area (`simple_model.threshold`).
+    The threshold is known for a `contactor` in m2, and rises by 3 dB for each halving of the area.
     """
     f = np.asarray(frequencies)
-    felt = threshold(f, "large_contactor") * np.sqrt(LARGE_CONTACTOR / area)
+    felt = threshold(f, "large_contactor") * np.sqrt(contactor / area)
     return np.pi / 2 * felt / np.abs(disc_compliance(body, area, f))
 
 
 @cache
-def least_impedance(body: Body, area: float) -> float:
+def least_impedance(body: Body, area: float, samples: Samples = USUAL) -> float:
     """Return the frequency in Hz at which a force on a disc moves the surface fastest."""
-    f = GRID[1::2]
+    f = samples.frequencies[1::2]
     return peak(f, f * np.abs(disc_compliance(body, area, f)))
 
 
-SPEEDS = np.arange(1.0, 16.1, 0.5)  # m/s, of a focus on a circle
-PERIMETERS = (0.100, 0.060)  # m: two, to separate effects of speed and of frequency
+def deflections(
+    body: Body, perimeter: float, speeds: Floats = USUAL.speeds, samples: int = 256
+) -> tuple[Floats, Floats]:
+    """Return steady deflections (v,) in m/Pa on a circle with a perimeter in m.
 
-
-def focus_speeds(body: Body, perimeter: float) -> tuple[Floats, Floats]:
-    """Return steady deflections (v,) in m/Pa on a circle with a perimeter in m, at each of `SPEEDS`
-    of the focus: the largest, and peak to peak, which is what a vibrometer measures.
+    Return for each speed of the focus the largest deflection and the deflection from peak to peak,
+    which a vibrometer measures. Both are of so many samples in a turn.
     """
     waves, probe = compliance(body), [[perimeter / (2 * np.pi), 0.0]]
     courses = []
-    samples = 256  # per turn
-    for speed in SPEEDS:
+    for speed in speeds:
         circle = Trajectory(shape="circle", size=perimeter / np.pi, speed=speed)
         pressure = MovingPressure(tacton=Tacton(trajectory=circle), peak_pressure=1.0)
         times = np.arange(samples) / circle.drawing_frequency / samples
         courses.append(steady_state(waves, pressure, probe, times).values[:, 0])
-    deflections = np.array(courses)
-    return deflections.max(axis=1), np.ptp(deflections, axis=1)
+    return np.max(courses, axis=1), np.ptp(courses, axis=1)
 
 
 def peak(x: Floats, y: Floats) -> float:
@@ -152,9 +163,6 @@ def peak(x: Floats, y: Floats) -> float:
     before, here, after = y[k - 1 : k + 2]
     step = (x[k + 1] - x[k - 1]) / 2
     return float(x[k] + step * (before - after) / (before - 2 * here + after) / 2)
-
-
-HAND_SIZE = 6.5e-3  # m, of elements: 5 and 8 mm change the 1/e lengths by up to 8 %
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -171,17 +179,18 @@ def along_finger(
     report: Progress,
     frequencies: tuple[float, ...] = (200.0, 300.0, 400.0),
     up: str = "-x",
+    h: float = 6.5e-3,
 ) -> Finger:
     """Return the decay on the palmar side of the longest finger of a hand, by finite elements.
 
-    The palm in the `file` faces `up`. Raises a ValueError if the file is missing or contains
-    no body.
+    The palm in the `file` faces `up`. Elements of 5 and 8 mm instead of `h`, in m, change the
+    lengths by up to 8 %. Raises a ValueError if the file is missing or contains no body.
     """
     if not file.is_file():
         raise ValueError(f"--hand {file} does not exist; give the mesh file of a hand")
     report("mesh the hand", 0.0)
     body = Body(kind="mesh", file=str(file), up=up)
-    made = build(body, HAND_SIZE)
+    made = build(body, h)
     # The tip is the point farthest from the middle; the wrist is on the side with most points.
     top = made.mesh.points[np.unique(made.mesh.facets["top"])][:, :2]
     along = top @ np.linalg.svd(top - top.mean(axis=0), full_matrices=False)[2][0]

@@ -38,8 +38,9 @@ class Published:
     """Published `values` (n,) of one quantity, in SI, at `frequencies` (n,) in Hz.
 
     A frequency is nan for a value without one; a value is nan if only a range is published. `lows`
-    and `highs` (n,) span people or a standard deviation; they are empty without a spread. `bodies`
-    of `predictions` are compared with the set, under contacts of each of the `areas` in m2.
+    and `highs` (n,) span people or a standard deviation; they are empty without a spread. Values
+    have a relative `reading_error` if they are read off a curve. `bodies` of `predictions` are
+    compared with the set, under contacts of each of the `areas` in m2.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Published:
     built: tuple[str, ...] = ()
     areas: tuple[float, ...] = ()
     remark: str = ""
+    reading_error: float = 0.05
 
     def between(self, k: int) -> tuple[float, float]:
         """Return the lowest and highest value, in SI, at frequency number k."""

@@ -103,7 +103,7 @@ def rayleigh_lamb(k: float, *, thickness: float, poisson: float, symmetric: bool
 
 def clamped_plate() -> tuple[Array, float]:
     """Return w a^2 sqrt(m / D), ascending, and the central deflection D w / q a^4 of a clamped
-    square plate, by the polynomials (1 - x^2)^2 x^n. Young gives 35.99 and 73.41, Timoshenko
+    square plate, by the polynomials (1 - x^2)^2 P_n. Young gives 35.99 and 73.41, Timoshenko
     0.00126.
     """
     x, weight = np.polynomial.legendre.leggauss(40)
@@ -135,8 +135,10 @@ def moving_force_on_beam(t: Array, *, speed: float, critical: float, period: flo
 def layered_column(
     w: Array, lengths: list[float], densities: list[float], moduli: list[Array]
 ) -> Array:
-    """Return the displacement per stress at the top of a column of layers on a fixed base:
-    tan(k L) / (k M) for one layer, joined by the addition theorem of the tangent; M may be complex.
+    """Return the displacement per stress at the top of a column of layers on a fixed base.
+
+    It is tan(k L) / (k M) for one layer with a real or complex modulus M. The addition theorem of
+    the tangent joins layers.
     """
     below = np.zeros_like(w, np.complex128)
     for length, density, modulus in zip(lengths, densities, moduli, strict=True):
@@ -154,32 +156,29 @@ def lamb_pulse(
     """
     s, g = np.sqrt(3), np.sqrt(3 + np.sqrt(3)) / 2
     x, weight = np.polynomial.legendre.leggauss(400)
-
-    def early(tau: Array) -> Array:
-        rest = np.sqrt(3 * s - 5) / np.sqrt(tau**2 - (3 - s) / 4) - s / np.sqrt(tau**2 - 0.25)
-        return (6 - np.sqrt(3 * s + 5) / np.sqrt(g**2 - tau**2) + rest) / 32
-
-    def late(tau: Array) -> Array:
-        return (6 - np.sqrt(3 * s + 5) / np.sqrt(g**2 - tau**2)) / 16
-
-    def convolved(step: Callable[[Array], Array], low: float, high: float) -> Array:
-        """Convolve; tau = g sin(angle) removes the root at the Rayleigh arrival."""
-        low, high = np.arcsin(low / g), np.arcsin(high / g)
-        angle = (low + high) / 2 + (high - low) / 2 * x
-        tau, d_tau = g * np.sin(angle), g * np.cos(angle) * weight * (high - low) / 2
+    # After the P wave, then after the S wave; at last 3 / 8 after the Rayleigh wave at tau = g.
+    motion = 3 / 8 * np.exp(-(((t - delay - g * r / shear_speed) / width) ** 2) / 2)
+    for low, high in ((1 / s, 1.0), (1.0, g)):
+        start, end = np.arcsin(low / g), np.arcsin(high / g)
+        angle = (start + end) / 2 + (end - start) / 2 * x
+        # tau = g sin(angle) removes the root at the Rayleigh arrival.
+        tau, d_tau = g * np.sin(angle), g * np.cos(angle) * weight * (end - start) / 2
+        step = (6 - np.sqrt(3 * s + 5) / np.sqrt(g**2 - tau**2)) / 16
+        if high == 1.0:
+            rest = np.sqrt(3 * s - 5) / np.sqrt(tau**2 - (3 - s) / 4) - s / np.sqrt(tau**2 - 0.25)
+            step = (step + rest / 16) / 2
         since = (t[:, None] - delay - tau * r / shear_speed) / width
         slope = -since / width * np.exp(-(since**2) / 2)
-        return slope @ (step(tau) * d_tau) * r / shear_speed
-
-    after = 3 / 8 * np.exp(-(((t - delay - g * r / shear_speed) / width) ** 2) / 2)
-    return (convolved(early, 1 / s, 1) + convolved(late, 1, g) + after) / (np.pi * mu * r)
+        motion = motion + slope @ (step * d_tau) * r / shear_speed
+    return motion / (np.pi * mu * r)
 
 
 def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Array, Array]:
-    """Return the reflected (P, SV) displacement amplitudes of a viscous boundary, in rows for P and
-    SV in, for plane waves with wavenumber k along it and shear wavenumber ks. Also return the
-    waves, in rows P in, SV in, P out, SV out: motion along and towards the boundary, and wavenumber
-    towards it.
+    """Return the reflected displacement amplitudes of a viscous boundary, and the plane waves.
+
+    Amplitudes have rows for P and SV in, and columns for P and SV out. The waves have a wavenumber
+    k along the boundary and a shear wavenumber ks. Their rows are P in, SV in, P out and SV out,
+    their columns motion along and towards the boundary, and wavenumber towards it.
     """
     ratio = np.sqrt((1 - 2 * poisson) / (2 - 2 * poisson))
     kp = ks * ratio
@@ -210,8 +209,10 @@ def driven_oscillator(
 
 
 def elastica(load: float) -> tuple[float, float]:
-    """Return the tip deflection and shortening of a cantilever over its length at load = P L^2 / E
-    I, by shooting with theta'' = -load cos(theta). Mattiasson gives 0.30172 and 0.05643 at 1.
+    """Return the tip deflection and shortening of a cantilever over its length.
+
+    The load is P L^2 / E I. Shooting solves theta'' = -load cos(theta). Mattiasson gives 0.30172
+    and 0.05643 at 1.
     """
 
     def bent(tip: float) -> Array:

@@ -1,6 +1,7 @@
 """Meshes, loads and bodies that several verification cases share."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -19,14 +20,28 @@ SLIDING = {"left": "x", "right": "x", "front": "y", "back": "y"}
 FOREARM: dict[str, Any] = {"density": 1000.0, "shear_modulus": 7.86e3, "viscosity": 5.03}
 THICKNESS = 1e-4  # m, of paper
 PAPER = {"bending_stiffness": 4e9 * 1e-12 / 12 / 0.91, "mass_per_area": 0.08}
-LAMB = "Lamb, Phil Trans R Soc A 203:1 (1904)"
-HANKEL = "Hankel's integral on the real axis: Sneddon, Fourier Transforms (1951)"
-ZENER = "standard linear solid: Zener, Elasticity and Anelasticity of Metals (1948)"
+SOURCES = {  # of several cases
+    "Achenbach": "Achenbach, Wave Propagation in Elastic Solids (1973)",
+    "Boussinesq": "Boussinesq's kernel; Gradshteyn and Ryzhik, 6.618.1",
+    "Hankel": "Hankel's integral on the real axis: Sneddon, Fourier Transforms (1951)",
+    "Hughes": "Hughes, The Finite Element Method (1987), chapter 9",
+    "Lamb": "Lamb, Phil Trans R Soc A 203:1 (1904)",
+    "Lysmer": "Lysmer and Kuhlemeyer, J Eng Mech Div ASCE 95:859 (1969)",
+    "Meirovitch": "Meirovitch, Principles and Techniques of Vibrations (1997)",
+    "Zener": "standard linear solid: Zener, Elasticity and Anelasticity of Metals (1948)",
+}
 
 
 def unit(poisson: float) -> fem.Material:
     """Return a material of density 1 and shear modulus 1."""
     return fem.Material(density=1, shear_modulus=1, poisson=poisson)
+
+
+def lossy_paper(thickness: float, lag: float) -> fem.Material:
+    """Return the material of a sheet like `PAPER`, whose viscosity is the lag times its modulus."""
+    mu = 12 * PAPER["bending_stiffness"] * (1 - 0.3**2) / thickness**3 / 2.6
+    density = PAPER["mass_per_area"] / thickness
+    return fem.Material(density=density, shear_modulus=mu, poisson=0.3, viscosity=lag * mu)
 
 
 def gaussian(width: float = WIDTH) -> Callable[[Array], Array]:
@@ -56,16 +71,16 @@ def quarter_space(length: float, growth: float, radius: float, h: float = 0.0025
 def column(
     lengths: list[float], cells: int, solids: dict[int, fem.Material]
 ) -> tuple[fem.Operators, Array, Array]:
-    """Return a column of layers, from the base upwards, one cell wide with sliding sides: its
-    operators, the force (3 n,) of 1 Pa, and the weights (3 n,) of the mean of its top.
+    """Return a column of layers, from the base upwards, one cell wide with sliding sides.
+
+    Return its operators, the force (3 n,) of 1 Pa, and the weights (3 n,) of the mean of its top.
     """
     ends = np.concatenate([[0], np.cumsum(lengths)]) - sum(lengths)
     z = np.concatenate([[ends[0]], *(np.linspace(a, b, cells + 1)[1:] for a, b in pairwise(ends))])
     side = [0.0, min(lengths) / cells * 2]
     mesh = meshes.extrude(side, side, z)
     middle = mesh.points[mesh.tets[:, :4]].mean(axis=1)[:, 2]
-    region = np.searchsorted(ends[1:-1], middle)
-    mesh = TetMesh(points=mesh.points, tets=mesh.tets, region=region, facets=mesh.facets)
+    mesh = replace(mesh, region=np.searchsorted(ends[1:-1], middle))
     ops = fem.assemble(mesh, solids, fixed={"bottom": "xyz", **SLIDING})
     force = push(mesh)
     return ops, force, force / np.abs(force).sum()

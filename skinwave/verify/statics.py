@@ -11,6 +11,7 @@ from skinwave.verify.case import Checks, case, relative
 from skinwave.verify.setups import (
     QUARTER,
     RADII,
+    SOURCES,
     WIDTH,
     column,
     gaussian,
@@ -21,7 +22,7 @@ from skinwave.verify.setups import (
 
 
 @case(
-    "Boussinesq's kernel; Gradshteyn and Ryzhik, 6.618.1; Johnson (1985), section 3.2",
+    f"{SOURCES['Boussinesq']}; Johnson (1985), section 3.2",
     mesh="a quarter; 2.5 mm at the focus, sides at 4 m", slow=True,
 )  # fmt: skip
 def focus_at_rest() -> Checks:
@@ -58,7 +59,7 @@ def poisson_ratios() -> Checks:
 
 
 @case(
-    "Meirovitch, Principles and Techniques of Vibrations (1997), chapter 7",
+    f"{SOURCES['Meirovitch']}, chapter 7",
     mesh="40 cells high, one across",
 )
 def stiffness_contrast() -> Checks:

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from itertools import islice
-from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -12,11 +11,9 @@ import meshes
 from skinwave.typing import Complex, Floats
 from skinwave.verify import references
 from skinwave.verify.case import Check, Checks, below, case, order, relative
-from skinwave.verify.setups import ZENER, column, gaussian, push
+from skinwave.verify.setups import SOURCES, column, gaussian, push
 
-HUGHES = "Hughes, The Finite Element Method (1987), chapter 9"
-MEIROVITCH = "Meirovitch, Principles and Techniques of Vibrations (1997)"
-SKIN: dict[str, Any] = {"density": 1000.0, "shear_modulus": 25e3, "poisson": 0.4999}
+SKIN = fem.Material(density=1000.0, shear_modulus=25e3, poisson=0.4999)
 BLOCK = "block of 2 by 2 by 1 cells, nu = 0.4999"
 
 
@@ -26,11 +23,11 @@ def oscillator(damping: float = 0.0) -> fem.Operators:
     return fem.Operators(K=K, C=C, M=M, R=R, free=np.array([0]), n_dofs=1)
 
 
-@case(f"{HUGHES}: average acceleration", mesh=BLOCK)
+@case(f"{SOURCES['Hughes']}: average acceleration", mesh=BLOCK)
 def energy() -> Checks:
     """Free vibration conserves energy, 4,000 steps."""
     mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
-    ops = fem.assemble(mesh, fem.Material(**SKIN))
+    ops = fem.assemble(mesh, SKIN)
     _, shapes = fem.modes(ops, 3)
     zero, free, u = np.zeros(mesh.n_dofs), ops.free, shapes.sum(axis=1)
     a = ops.expand(fem.factorise(ops.M).solve(-(ops.K @ u[free])))
@@ -41,14 +38,15 @@ def energy() -> Checks:
 
 
 @case(
-    f"Energy balance of a step load from rest, u K u / 2 <= f u: {HUGHES}: stable for any step",
+    f"Energy balance of a step load from rest, u K u / 2 <= f u: {SOURCES['Hughes']}: stable for "
+    "any step",
     mesh=f"{BLOCK}; 1000 steps of each",
     note="Values are the largest energy norm of the motion over that at rest, at most 2.",
 )
 def extreme_steps() -> Checks:
     """Time steps 100 times too large and too small."""
     mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
-    ops, force = fem.assemble(mesh, fem.Material(**SKIN)), push(mesh)
+    ops, force = fem.assemble(mesh, SKIN), push(mesh)
     period = 1 / fem.modes(ops, 1)[0][0]
     rest = fem.static(ops, force)[ops.free]
     for factor in (2.5, 2.5e-4):
@@ -60,7 +58,7 @@ def extreme_steps() -> Checks:
 
 
 @case(
-    f"{MEIROVITCH}, chapter 7: tan(k L) / (k E), complex E (nu = 0); {ZENER}",
+    f"{SOURCES['Meirovitch']}, chapter 7: tan(k L) / (k E), complex E (nu = 0); {SOURCES['Zener']}",
     mesh="24 cells high, one across; at least 0.6 elements per wavelength",
     note="Complex amplitude of the top under 1 Pa, at the frequency with the largest error.",
 )
@@ -68,8 +66,8 @@ def columns() -> Checks:
     """Column fixed at its base and pushed at its top: Kelvin-Voigt and standard linear solid."""
     hz = np.array([20.0, 60.0, 120.0])
     for density, mu, lag in (
-        (1000.0, 25e3, 0.0), (1000.0, 25e3, 2e-4), (1000.0, 25e3, 0.1), (30.0, 5e3, 1e-3),
-        (7800.0, 77e9, 1e-6),
+        (1000.0, 25e3, 0.0), (1000.0, 25e3, 2e-4), (1000.0, 25e3, 0.1),
+        (30.0, 5e3, 1e-3), (7800.0, 77e9, 1e-6),
     ):  # fmt: skip
         solid = fem.Material(density=density, shear_modulus=mu, poisson=0.0, viscosity=lag * mu)
         name = f"density {density:g}, modulus {mu:g} Pa, viscosity {lag * mu:g} Pa s"
@@ -83,8 +81,8 @@ def columns() -> Checks:
 
 
 @case(
-    f"partial fractions: Flugge, Viscoelasticity (1975), chapter 3; {MEIROVITCH}, sections 3.1 and "
-    f"3.2; order: {HUGHES}",
+    "partial fractions: Flugge, Viscoelasticity (1975), chapter 3; "
+    f"{SOURCES['Meirovitch']}, sections 3.1 and 3.2; order: {SOURCES['Hughes']}",
     mesh="one degree of freedom of unit mass and stiffness, damped or with a Maxwell branch",
 )
 def order_in_time() -> Checks:
@@ -92,7 +90,7 @@ def order_in_time() -> Checks:
     exact = references.driven_oscillator(2.0, damping=0.2, drive=3.0)
     yield from _order_of_steps(oscillator(0.2), exact, 100, "damped")
     plain = oscillator()
-    modulus, time = 0.8, 0.7  # of an oscillator's Maxwell branch: stiffness and relaxation time
+    modulus, time = 0.8, 0.7  # of the Maxwell branch: stiffness and relaxation time
     ops = replace(plain, branches=(fem.MaxwellBranch(K=modulus * plain.K, time=time),))
     exact = references.driven_oscillator(2.0, modulus=modulus, time=time, drive=3.0)
     yield from _order_of_steps(ops, exact, 200, "with a Maxwell branch")
@@ -110,16 +108,14 @@ def order_in_time() -> Checks:
 )
 def units() -> Checks:
     """Units scaled by a millionth to a million."""
-    base = _responses(1.0, 1.0, 1.0)
-    for name, place in (("length", 0), ("time", 1), ("mass", 2)):
+    base = _responses()
+    for name in ("length", "time", "mass"):
         for factor in (1e-6, 1e-3, 1e3, 1e6):
-            scales = [1.0, 1.0, 1.0]
-            scales[place] = factor
-            change = np.abs(_responses(*scales) / base - 1).max()
+            change = np.abs(_responses(**{name: factor}) / base - 1).max()
             yield below(f"unit of {name} x {factor:g}: largest change", change, 1e-8)
 
 
-def _responses(length: float, time: float, mass: float) -> Floats:
+def _responses(length: float = 1.0, time: float = 1.0, mass: float = 1.0) -> Floats:
     """Return dimensionless responses of one body, in units that are these factors smaller."""
     pascal = mass / length / time**2
     mesh = meshes.block((0.02 * length, 0.02 * length, 0.01 * length), 0.005 * length)

@@ -1,9 +1,7 @@
 """Suite of verification cases, and its page."""
 
 import json
-import math
 from collections.abc import Iterable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +13,14 @@ from skinwave.system.table import Table
 from skinwave.verify import elements, exact, extremes, nonlinear, plates, statics, stepping, waves
 from skinwave.verify.case import Case, Check, Result
 
-MODULES = {
-    "Elements": elements, "At rest": statics, "Plates and beams": plates, "Waves": waves,
-    "Wavenumber integrals": exact, "Time, damping, units": stepping,
-    "Extreme loads": extremes, "Large deflection": nonlinear,
-}  # fmt: skip
 TOPICS = {
     topic: [each for each in vars(module).values() if isinstance(each, Case)]
-    for topic, module in MODULES.items()
-}
+    for topic, module in {
+        "Elements": elements, "At rest": statics, "Plates and beams": plates, "Waves": waves,
+        "Wavenumber integrals": exact, "Time, damping, units": stepping,
+        "Extreme loads": extremes, "Large deflection": nonlinear,
+    }.items()
+}  # fmt: skip
 CASES = {each.name: each for cases in TOPICS.values() for each in cases}
 VALUES = ("value", "reference", "error", "tolerance", "result")
 
@@ -125,23 +122,18 @@ def _row(check: Check) -> list[Any]:
 
 
 def _write_json(path: Path, results: list[Result], planned: int) -> None:
+    """Write finished cases, with null for numbers that are not finite."""
+    names = ("what", "value", "reference", "error", "bar", "unit", "passed")
+    cases = [
+        {name: getattr(r.case, name) for name in ("name", "title", "source", "mesh", "note")}
+        | {"passed": r.passed, "seconds": round(r.seconds, 2), "error": r.error}
+        | {"checks": Table(names, ([getattr(c, n) for n in names] for c in r.checks)).records()}
+        for r in results
+    ]
     passed = sum(r.passed for r in results)
     record = {
         "passed": passed, "failed": len(results) - passed, "planned": planned,
         "seconds": round(sum(r.seconds for r in results), 1), "versions": versions(),
-        "cases": [_record(r) for r in results],
+        "cases": cases,
     }  # fmt: skip
     path.write_text(json.dumps(record, indent=1), encoding="utf-8")
-
-
-def _record(result: Result) -> dict[str, Any]:
-    """Return a finished case for JSON, with null for numbers that are not finite."""
-    checks = [
-        {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
-        for row in ({**asdict(c), "passed": c.passed} for c in result.checks)
-    ]
-    about = ("name", "title", "source", "mesh", "note")
-    return {name: getattr(result.case, name) for name in about} | {
-        "passed": result.passed, "seconds": round(result.seconds, 2), "error": result.error,
-        "checks": checks,
-    }  # fmt: skip

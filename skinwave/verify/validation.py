@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf, isnan, nan
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import matplotlib as mpl
 import numpy as np
@@ -18,7 +19,7 @@ from skinwave.system.document import Details, Part, Picture, Report, Section, co
 from skinwave.system.effort import Progress, silent
 from skinwave.system.table import Column, Table
 from skinwave.verify import predictions
-from skinwave.verify.predictions import BODIES, Curves, Finger, peak
+from skinwave.verify.predictions import BODIES, USUAL, Curves, Finger, Samples, peak
 from skinwave.verify.published import (
     ALL,
     CONTACTS,
@@ -36,23 +37,13 @@ from skinwave.verify.published import (
     all_sources,
 )
 
+Outcome = Literal["within", "below", "above", "no wave"]
 QUANTITIES = SPEED, LENGTH, EXPONENT, FORCE, SOFTEST  # each with a sentence and a row
-NONE, WITHIN, ABOVE, BELOW = "no wave", "within", "above", "below"
-READING_ERROR = 0.05  # relative, of a value that is read off a published curve
 HAND = "hand, finite elements"
 COLOURS = {
     "forearm": "#D55E00", "palm": "#0072B2", "palm-stiff": "#56B4E9", "skin-slab": "#009E73",
-    "palm-layers": "#CC79A7", "forearm-layers": "#E69F00", HAND: "#000000",
+    "palm-layers": "#CC79A7", "forearm-layers": "#E69F00", HAND: "#000000", "range": "#dddddd",
 }  # fmt: skip
-BAND = "#dddddd"
-DRAWN_FACTOR = 10.0  # larger factors are drawn at this one
-SPEEDS = (
-    "Points: sources, with the spread between people or a standard deviation where published. "
-    "Grey: range over all sources at each frequency. Lines: for each preset, the wave that moves "
-    "the surface most at the edge of the focal spot (half-spaces solid, layers on bone dashed). A "
-    "line breaks where another mode leads, and ends where no wave propagates. Lengths are those of "
-    "plane waves, without geometric spreading."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +69,7 @@ class Compared:
     def factor(self) -> float:
         """Our value over the nearest published one: 1 within the spread, nan without our value."""
         low, high = self.published.between(self.k)
-        margin = 0.0 if self.published.lows else READING_ERROR
+        margin = 0.0 if self.published.lows else self.published.reading_error
         if (1 - margin) * low <= self.ours <= (1 + margin) * high:
             return 1.0
         return self.ours / (high if self.ours > high else low)
@@ -89,49 +80,50 @@ class Compared:
         return max(self.factor, 1 / self.factor) if self.factor else inf
 
     @property
-    def outcome(self) -> str:
-        """One of `NONE`, `WITHIN`, `ABOVE` and `BELOW`."""
+    def outcome(self) -> Outcome:
+        """Where our value lies beside the published one."""
         if isnan(self.factor):
-            return NONE
-        return WITHIN if self.factor == 1.0 else ABOVE if self.factor > 1 else BELOW
+            return "no wave"
+        return "within" if self.factor == 1.0 else "above" if self.factor > 1 else "below"
 
 
 def compare_set(published: Published, body: str, ours: Iterable[float]) -> list[Compared]:
     """Return rows of a set and a body with values (n,), in SI, at the frequencies of the set."""
-    return [
-        Compared(published=published, k=k, body=body, ours=float(value))
-        for k, value in enumerate(ours)
-    ]
+    return [Compared(published=published, k=k, body=body, ours=float(value))
+            for k, value in enumerate(ours)]  # fmt: skip
 
 
 def validate(
-    report: Progress, *, hand: Path | None = None
+    report: Progress, *, hand: Path | None = None, samples: Samples = USUAL
 ) -> tuple[Mapping[str, Curves], list[Compared]]:
-    """Return the leading wave of each body, and rows of all published sets. With the file of a
-    `hand`, rows include the decay along its finger, by finite elements.
+    """Return the leading wave of each body, and rows of all published sets.
+
+    With the file of a `hand`, rows include the decay along its finger, by finite elements.
     """
     of_hand = compare_finger(predictions.along_finger(hand, report)) if hand else []
     report("waves", 0.02)
-    curves = {name: predictions.leading_wave(body) for name, body in BODIES.items()}
+    curves = {name: predictions.leading_wave(body, samples.frequencies)
+              for name, body in BODIES.items()}  # fmt: skip
     sets = (*WAVES, all_sources(SPEED), all_sources(LENGTH), *CONTACTS, OPTIMUM)
-    return curves, compare_sets(sets, curves, report) + of_hand
+    return curves, compare_sets(sets, curves, report, samples) + of_hand
 
 
 def compare_sets(
-    sets: Sequence[Published], curves: Mapping[str, Curves], report: Progress = silent
-) -> list[Compared]:
+    sets: Sequence[Published], curves: Mapping[str, Curves], report: Progress = silent,
+    samples: Samples = USUAL,
+) -> list[Compared]:  # fmt: skip
     """Return rows of published sets for their bodies, some with several contacts or paths."""
     rows = []
     for k, each in enumerate(sets):
         report(each.quantity.name, 0.1 + 0.9 * k / len(sets))
         for name in each.bodies:
-            for under, ours in _predicted(each, name, curves).items():
+            for under, ours in _predicted(each, name, curves, samples).items():
                 rows += compare_set(replace(each, name=each.name + under), name, ours)
     return rows
 
 
 def _predicted(
-    each: Published, name: str, curves: Mapping[str, Curves]
+    each: Published, name: str, curves: Mapping[str, Curves], samples: Samples
 ) -> Mapping[str, Iterable[float]]:
     """Return the predictions (n,) of a body at the frequencies of a set by contact or path."""
     body, f = BODIES[name], each.frequencies
@@ -141,15 +133,16 @@ def _predicted(
     if each.quantity is FORCE:
         return {of: predictions.threshold_force(body, area, f) for of, area in contacts.items()}
     if each.quantity is SOFTEST:
-        return {of: [predictions.least_impedance(body, area)] for of, area in contacts.items()}
+        least = partial(predictions.least_impedance, body, samples=samples)
+        return {of: [least(area)] for of, area in contacts.items()}
     if each is OPTIMUM:
-        return {
-            f", {what}, {1e3 * perimeter:g} mm around": [peak(predictions.SPEEDS, deflection)]
-            for perimeter in predictions.PERIMETERS
-            for what, deflection in zip(
-                ("largest", "peak to peak"), predictions.focus_speeds(body, perimeter), strict=True
-            )
-        }
+        found = {}
+        for perimeter in samples.perimeters:
+            largest, swing = predictions.deflections(body, perimeter, samples.speeds)
+            for what, deflection in (("largest", largest), ("peak to peak", swing)):
+                where = f", {what}, {1e3 * perimeter:g} mm around"
+                found[where] = [peak(samples.speeds, deflection)]
+        return found
     return {"": curves[name].at(each.quantity, f)}
 
 
@@ -167,13 +160,13 @@ def verdict(rows: Sequence[Compared]) -> list[str]:
     """Return sentences that sum up the comparisons."""
     single = [row for row in rows if not row.published.name.startswith(ALL)]
     own = [row for row in single if not row.is_built]
-    within, missed = _count(own, WITHIN), [row for row in own if row.outcome in (ABOVE, BELOW)]
+    within, low, high, without = _counts(own)
     sentences = [
         f"{within} of {len(own)} independent comparisons agree within the published spread or "
-        f"{100 * READING_ERROR:g} %; {len(missed)} miss, by a factor of {_median(missed)} in the "
-        "median.",
-        f"In {_count(own, NONE)} the model has no wave. {len(single) - len(own)} more comparisons "
-        "are of presets that were fitted to the source; they are no evidence.",
+        f"{100 * Published.reading_error:g} %; {low + high} miss, by a factor of {_median(own)} in "
+        "the median.",
+        f"In {without} the model has no wave. {len(single) - len(own)} more comparisons are of "
+        "presets that were fitted to the source; they are no evidence.",
     ]
     for name, number, _, below, by, above, over, apart in _by_quantity(own):
         parts = [f"{below} are too low, by a factor of {by} in the median"] * bool(below)
@@ -198,31 +191,34 @@ def _by_quantity(own: Sequence[Compared]) -> list[list[Any]]:
     """Return a row for each quantity: number of independent values, those within, those below and
     above with their median factors, and the largest factor between sources at one frequency.
     """
-    rows: list[list[Any]] = []
+    rows = []
     for quantity in QUANTITIES:
         alike = [row for row in own if row.published.quantity is quantity]
-        below, above = ([r for r in alike if r.outcome == each] for each in (BELOW, ABOVE))
-        apart = None
-        if quantity in (SPEED, LENGTH):
-            band = all_sources(quantity)
-            ratios = (high / low for low, high in zip(band.lows, band.highs, strict=True))
-            apart = significant(max(ratios), 2)
-        misses = (
-            x for each in (below, above) for x in (len(each), _median(each) if each else None)
-        )
-        rows.append([quantity.name, len(alike), _count(alike, WITHIN), *misses, apart])
+        within, below, above, _ = _counts(alike)
+        low = _median(row for row in alike if row.outcome == "below") if below else None
+        high = _median(row for row in alike if row.outcome == "above") if above else None
+        band = all_sources(quantity) if quantity in (SPEED, LENGTH) else None
+        apart = significant(np.max(np.divide(band.highs, band.lows)), 2) if band else None
+        rows.append([quantity.name, len(alike), within, below, low, above, high, apart])
     return rows
 
 
-def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
-    """Return the page, with its figures and validation.csv."""
+def report(curves: Mapping[str, Curves], rows: Sequence[Compared], largest: float = 10.0) -> Report:
+    """Return the page, with its figures and validation.csv; factors are drawn up to a largest."""
     sources = {row.published.name: row.published for row in rows}
     first, *others = verdict(rows)
     own = [row for row in rows if not row.is_built and not row.published.name.startswith(ALL)]
     factors = (
         "Each point is a preset at a frequency. Grey: within 5 %, the accuracy of reading a curve. "
         "Hollow: the preset was fitted to that source. Filled: it predicts the source. "
-        f"Factors beyond {DRAWN_FACTOR:g} are drawn at {DRAWN_FACTOR:g}."
+        f"Factors beyond {largest:g} are drawn at {largest:g}."
+    )
+    waves = (
+        "Points: sources, with the spread between people or a standard deviation where published. "
+        "Grey: range over all sources at each frequency. Lines: for each preset, the wave that "
+        "moves the surface most at the edge of the focal spot (half-spaces solid, layers on bone "
+        "dashed). A line breaks where another mode leads, and ends where no wave propagates. "
+        "Lengths are those of plane waves, without geometric spreading."
     )
     scope = (
         "Verification checks that the equations are solved correctly. This page checks whether "
@@ -231,13 +227,14 @@ def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
         "as fitted. All other values are predictions. A factor is the model's value over the "
         "published value, or over the nearer end of its spread."
     )
+    height, draw_factors = 0.24 * len(sources) + 1.2, partial(_factors, rows=rows, largest=largest)
     parts: list[Part] = [
-        _picture("factors", _factors, (10.5, 0.24 * len(sources) + 1.2), factors, rows),
+        _picture("factors", draw_factors, (10.5, height), factors),
         " ".join([others[0], *others[1 + len(QUANTITIES):]]), scope,
         Details("Every set and preset", [_summary(rows)]),
         Details("Every value", [_table(rows)]),
         Section("Speed and decay of waves",
-                [_picture("waves", _waves, (11.5, 5.6), SPEEDS, curves)]),
+                [_picture("waves", partial(_waves, curves=curves), (11.5, 5.6), waves)]),
         Details("Sources", [Table(
             ["set", "site", "conditions", "source", "quality", "contradictions and assumptions"],
             [(s.name, s.site, s.conditions, s.source, s.how, s.remark) for s in sources.values()],
@@ -252,13 +249,15 @@ def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
     return Report("Models and published measurements", [first], [table, contents(parts), *parts])
 
 
-def _count(rows: Iterable[Compared], outcome: str) -> int:
-    return sum(row.outcome == outcome for row in rows)
+def _counts(rows: Iterable[Compared]) -> list[int]:
+    """Return the number of rows within, below, above, and without a wave."""
+    return [*map([row.outcome for row in rows].count, get_args(Outcome))]
 
 
 def _median(rows: Iterable[Compared]) -> str:
     """Return the median factor of rows that miss."""
-    return significant(float(np.median([row.miss for row in rows] or [1.0])), 2)
+    misses = [row.miss for row in rows if row.outcome in ("below", "above")]
+    return significant(float(np.median(misses or [1.0])), 2)
 
 
 def _summary(rows: Sequence[Compared]) -> Table:
@@ -266,14 +265,12 @@ def _summary(rows: Sequence[Compared]) -> Table:
     groups: dict[tuple[str, str], list[Compared]] = {}
     for row in rows:
         groups.setdefault((row.published.name, row.body), []).append(row)
-    return Table(
-        ["set", "preset", "fitted or predicted", "values", WITHIN, BELOW, ABOVE, NONE,
-         "median factor of a miss"],
-        [(name, body, "fitted" if group[0].is_built else "predicted", len(group),
-          *(_count(group, outcome) for outcome in (WITHIN, BELOW, ABOVE, NONE)),
-          _median(row for row in group if row.outcome in (ABOVE, BELOW)))
-         for (name, body), group in groups.items()],
-    )  # fmt: skip
+    columns = ("set", "preset", "fitted or predicted", "values", *get_args(Outcome),
+               "median factor of a miss")  # fmt: skip
+    return Table(columns, (
+        (name, body, "fitted" if group[0].is_built else "predicted", len(group), *_counts(group),
+         _median(group)) for (name, body), group in groups.items()
+    ))  # fmt: skip
 
 
 def _table(rows: Sequence[Compared]) -> Table:
@@ -297,12 +294,11 @@ def _table(rows: Sequence[Compared]) -> Table:
 
 
 def _picture(
-    name: str, draw: Callable[[Figure, Any], None], size: tuple[float, float], caption: str,
-    data: Any,
-) -> Picture:  # fmt: skip
+    name: str, draw: Callable[[Figure], None], size: tuple[float, float], caption: str
+) -> Picture:
     with mpl.rc_context(REPORT.rc):
         figure = Figure(figsize=REPORT.size(*size), layout="constrained")
-        draw(figure, data)
+        draw(figure)
     return Picture(png(figure), caption, name)
 
 
@@ -311,19 +307,20 @@ def _style(name: str) -> dict[str, Any]:
     return {"color": COLOURS[name], "ls": "-" if BODIES[name].depth == inf else "--"}
 
 
-def _factors(figure: Figure, rows: Sequence[Compared]) -> None:
+def _factors(figure: Figure, rows: Sequence[Compared], largest: float) -> None:
     """Draw the factors, a row of points for each set."""
     ax, names = figure.subplots(), list(dict.fromkeys(row.published.name for row in rows))
-    ax.axvspan(1 - READING_ERROR, 1 + READING_ERROR, color=BAND, lw=0)
-    for row in (row for row in rows if row.outcome != NONE):
+    error = Published.reading_error
+    ax.axvspan(1 - error, 1 + error, color=COLOURS["range"], lw=0)
+    for row in (row for row in rows if row.outcome != "no wave"):
         offset, colour = (list(COLOURS).index(row.body) - 3) / 9, COLOURS[row.body]
-        factor = np.clip(row.factor, 1 / DRAWN_FACTOR, DRAWN_FACTOR)
+        factor = np.clip(row.factor, 1 / largest, largest)
         ax.plot(
             factor, names.index(row.published.name) + offset, "o", ms=4, mew=1, color=colour,
             mfc="none" if row.is_built else None,
         )  # fmt: skip
     ax.set(
-        xscale="log", xlim=(0.9 / DRAWN_FACTOR, DRAWN_FACTOR / 0.9), ylim=(len(names) - 0.5, -0.5),
+        xscale="log", xlim=(0.9 / largest, largest / 0.9), ylim=(len(names) - 0.5, -0.5),
         xlabel="model over nearest published value",
     )  # fmt: skip
     ticks = [0.1, 0.2, 0.5, 1, 2, 5, 10]
@@ -331,7 +328,8 @@ def _factors(figure: Figure, rows: Sequence[Compared]) -> None:
     ax.minorticks_off()
     ax.set_yticks(range(len(names)), names)
     ax.grid(alpha=0.25)
-    marks = [Line2D([], [], color=c, marker="o", ls="", ms=4, label=n) for n, c in COLOURS.items()]
+    marks = [Line2D([], [], color=colour, marker="o", ls="", ms=4, label=name)
+             for name, colour in COLOURS.items() if name != "range"]  # fmt: skip
     figure.legend(handles=marks, loc="outside upper right", ncols=7, fontsize=8, frameon=False)
 
 
@@ -358,7 +356,7 @@ def _sources(ax: Axes, quantity: Quantity) -> None:
     """Draw published values with their spread, or their range, and the range of all sources."""
     size, whole = quantity.size, all_sources(quantity)
     low, high = (np.array(x) / size for x in (whole.lows, whole.highs))
-    ax.fill_between(whole.frequencies, low, high, color=BAND, lw=0, zorder=0)
+    ax.fill_between(whole.frequencies, low, high, color=COLOURS["range"], lw=0, zorder=0)
     sets = [each for each in WAVES if each.quantity is quantity]
     for marker, each in zip("osv^DPX", sets, strict=False):
         low, high = np.array([each.between(k) for k in range(len(each.values))]).T / size

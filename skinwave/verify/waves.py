@@ -15,13 +15,13 @@ from skinwave.scene.scene import Body
 from skinwave.typing import Array
 from skinwave.verify import references
 from skinwave.verify.case import Checks, absolute, below, case, misfit, relative
+from skinwave.verify.predictions import peak
 from skinwave.verify.setups import (
     FOREARM,
-    HANKEL,
-    LAMB,
     QUARTER,
     RADII,
     SLIDING,
+    SOURCES,
     WIDTH,
     frequencies,
     gaussian,
@@ -32,12 +32,9 @@ from skinwave.verify.setups import (
     unit,
 )
 
-ACHENBACH = "Achenbach, Wave Propagation in Elastic Solids (1973)"
-LYSMER = "Lysmer and Kuhlemeyer, J Eng Mech Div ASCE 95:859 (1969)"
-
 
 @case(
-    f"{LAMB}; {HANKEL}",
+    f"{SOURCES['Lamb']}; {SOURCES['Hankel']}",
     mesh="a quarter; 3 mm to 20 mm from the focus, sides fixed at 100 mm", slow=True,
 )  # fmt: skip
 def steady_focus() -> Checks:
@@ -66,9 +63,8 @@ def steady_focus() -> Checks:
 def lamb() -> Checks:
     """Lamb's problem: a pulse of force on a half-space, nu = 0.25."""
     mesh = _sector(2.3, 0.14)
-    ops = fem.assemble(
-        mesh, unit(0.25), fixed={"front": "y", "back": "x", "bottom": "xyz"}, absorbing="right",
-    )  # fmt: skip
+    fixed = {"front": "y", "back": "x", "bottom": "xyz"}
+    ops = fem.assemble(mesh, unit(0.25), fixed=fixed, absorbing="right")
     delay, width = 0.8, 0.2
     force = push(mesh, gaussian(0.012))
     force /= 4 * np.abs(force[2::3].sum())
@@ -82,12 +78,12 @@ def lamb() -> Checks:
     )
     yield misfit("vertical motion at r = 1, relative L2", motion[:, 0], exact[:, 0], 0.02)
     yield misfit("vertical motion at r = 1.5, relative L2", motion[:, 1], exact[:, 1], 0.02)
-    ours, theirs = (0.5 / np.diff(_crest_times(t, u))[0] for u in (motion, exact))
+    ours, theirs = (0.5 / np.diff([peak(t, u) for u in each.T])[0] for each in (motion, exact))
     yield relative("Rayleigh speed: 0.5 over the crest's time between both", ours, theirs, 0.01)
 
 
 @case(
-    f"Rayleigh, Proc London Math Soc 17:4 (1885); {ACHENBACH}, chapter 5",
+    f"Rayleigh, Proc London Math Soc 17:4 (1885); {SOURCES['Achenbach']}, chapter 5",
     mesh="half a wavelength between sliding ends, 2.5 wavelengths deep",
 )
 def rayleigh() -> Checks:
@@ -107,7 +103,7 @@ def rayleigh() -> Checks:
 
 
 @case(
-    f"Lamb, Proc R Soc A 93:114 (1917); {ACHENBACH}, chapter 6",
+    f"Lamb, Proc R Soc A 93:114 (1917); {SOURCES['Achenbach']}, chapter 6",
     mesh="half a wavelength between sliding ends, 4 cells through the thickness",
 )
 def plate_waves() -> Checks:
@@ -117,12 +113,11 @@ def plate_waves() -> Checks:
     for name in ("A0", "S0"):
         for k, w in zip(wavenumbers, strips, strict=True):
             exact = references.rayleigh_lamb(k, thickness=1, poisson=0.3, symmetric=name == "S0")
-            yield relative(
-                f"{name}: c / c_s at k h = {k:g}", nearest(w, exact) / k, exact / k, 0.005
-            )
+            what = f"{name}: c / c_s at k h = {k:g}"
+            yield relative(what, nearest(w, exact) / k, exact / k, 0.005)
 
 
-@case(f"{LYSMER}: no reflection at normal incidence", mesh="50 cells high")
+@case(f"{SOURCES['Lysmer']}: no reflection at normal incidence", mesh="50 cells high")
 def absorbed_pulse() -> Checks:
     """Shear pulse that runs down a column and leaves through a viscous boundary."""
     material = fem.Material(density=1000, shear_modulus=25e3, poisson=0.45)
@@ -140,7 +135,7 @@ def absorbed_pulse() -> Checks:
 
 
 @case(
-    f"{LYSMER}, from the boundary condition; displacement amplitudes",
+    f"{SOURCES['Lysmer']}, from the boundary condition; displacement amplitudes",
     mesh="strip of half a trace wavelength, 8 elements per shear wavelength, 3 long",
 )
 def oblique_p_sv() -> Checks:
@@ -194,15 +189,7 @@ def _sector(length: float, h: float) -> TetMesh:
     down = meshes.graded_axis(length, 0.01, meshes.Grading(radius=0.0, growth=1.35, coarsest=h))
     box = meshes.extrude(0.003 + out, np.linspace(0, np.pi / 2, 4), -down[::-1])
     r, angle, z = box.points.T
-    points = np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
-    return TetMesh(points=points, tets=box.tets, facets=box.facets)
-
-
-def _crest_times(t: Array, u: Array) -> Array:
-    """Return the time of the largest value of each column, by a parabola through three samples."""
-    k, columns = np.argmax(u, axis=0), np.arange(u.shape[1])
-    a, b, c = u[k - 1, columns], u[k, columns], u[k + 1, columns]
-    return t[k] + (t[1] - t[0]) * (a - c) / (a - 2 * b + c) / 2
+    return replace(box, points=np.column_stack([r * np.cos(angle), r * np.sin(angle), z]))
 
 
 def _reflected_in_plane(k: float, waves: Array) -> Array:
@@ -218,8 +205,7 @@ def _reflected_in_plane(k: float, waves: Array) -> Array:
     downwards = into * np.cos(k * x[inner])[:, None] * wave
     amplitudes = []
     ops = fem.assemble(mesh, unit(0.25), fixed=SLIDING, absorbing="bottom")
-    pressure = push(mesh, lambda x: np.cos(k * x[:, 0]))
-    sine = push(mesh, lambda x: np.sin(k * x[:, 0]))
+    pressure, sine = (push(mesh, lambda x, f=f: f(k * x[:, 0])) for f in (np.cos, np.sin))
     traction = np.roll(sine.reshape(-1, 3), 1, axis=1).ravel()  # along x
     for force in (pressure, traction):
         u = fem.harmonic(ops, force, 1.0)[0].reshape(-1, 3)

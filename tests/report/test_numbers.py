@@ -1,7 +1,5 @@
 """Numbers and tables as pages and files print them."""
 
-import json
-
 import numpy as np
 from markupsafe import Markup
 
@@ -33,7 +31,7 @@ def test_levels_errors_and_ranges():
 
 def test_a_table_is_csv_json_and_html():
     assert TABLE.to_csv() == b"f_hz,line\r\n127.384,f_d\r\n,'=1+1\r\n"
-    assert json.loads(TABLE.to_json())[1] == {"f_hz": None, "line": "=1+1"}
+    assert TABLE.records()[1] == {"f_hz": None, "line": "=1+1"}
     assert '<th class="number">frequency, Hz</th><th>line</th>' in TABLE.html()
     assert '<td class="number">127</td>' in TABLE.html()
     assert TABLE.only("line", most=1).rows == (("f_d",),)
