@@ -24,8 +24,7 @@ def axis_label(column: str) -> str:
     words = names.get(name)
     if words is None:
         words = name.split(".", 1)[-1] if re.match(r"[a-z]+\.[a-z]", name) else name
-        for end in UNITS:
-            words = words.removesuffix(end) if words != end else words
+        words = words.removesuffix(_unit_end(name)).strip("_") or words
         words = words.replace("_kernel", " of the point kernel")
         words = re.sub(r"(?<![a-z])(\d*f)_(AM2?|[de])(?![A-Za-z])", r"$\1_{\2}$", words)
         words = re.sub(r"_(?!\{)", " ", words)
@@ -35,8 +34,11 @@ def axis_label(column: str) -> str:
 
 def column_unit(name: str) -> str:
     """Return the unit of a column, by the end of its name, or ""."""
-    ends = sorted((end for end in UNITS if name.endswith(end)), key=len)
-    return UNITS[ends[-1]] if ends else ""
+    return UNITS.get(_unit_end(name), "")
+
+
+def _unit_end(name: str) -> str:
+    return max((end for end in UNITS if name.endswith(end)), key=len, default="")
 
 
 def at_probe(column: str) -> tuple[str, int | None]:

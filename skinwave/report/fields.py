@@ -55,16 +55,16 @@ if TYPE_CHECKING:
 class Field:
     """Motion of a whole body from rest at some times, and the load on its surface.
 
-    Displacement is computed when it is first read, velocity and strain at the times at which they
-    are converted or saved. Raises a ValueError if the times do not ascend within the duration.
+    Displacement is computed when it is first read, velocity and strain when they are converted or
+    saved. Raises a ValueError if the times do not ascend within the duration.
 
     Parameters
     ----------
     scene : Scene
     moved : BodyMotion, the body's motion at any time
-    times : (t,) float, s; `dataclasses.replace` with others computes nothing again but the motion
+    times : (t,) float, s; with `dataclasses.replace`, other times need no new solution
     effort : Effort; its expected error is that of the displacement at the scene's probes, or of
-        the response that was given; those of velocity and strain may be larger
+        the response that was given. Velocity and strain may have larger errors
     """
 
     scene: Scene
@@ -94,14 +94,12 @@ class Field:
 
     def __repr__(self) -> str:
         size = 1e6 * float(np.sqrt((self.displacement**2).sum(axis=2).max(initial=0.0)))
-        parts = [
-            f"{plural(len(self.times), 'time')} from {1e3 * self.times[0]:g} to "
-            f"{1e3 * self.times[-1]:.5g} ms, displacement at most {significant(size)} µm",
-            f"{self.mesh!r}"[1:-1],
-            f"expected error {self.effort.errors.words}",
-            plural(len(self.effort.warnings), "warning"),
-        ]
-        return f"<Field: {'; '.join(parts)}>"
+        return (
+            f"<Field: {plural(len(self.times), 'time')} from {1e3 * self.times[0]:g} to "
+            f"{1e3 * self.times[-1]:.5g} ms, displacement at most {significant(size)} µm; "
+            f"{f'{self.mesh!r}'[1:-1]}; expected error {self.effort.errors.words}; "
+            f"{plural(len(self.effort.warnings), 'warning')}>"
+        )
 
     def frame(self, time: float | None = None) -> int:
         """Return the index of the frame nearest to a time in s, or of the largest displacement.
@@ -111,8 +109,7 @@ class Field:
         times = self.times
         if time is None:
             return int(np.argmax((self.displacement**2).sum(axis=2).max(axis=1)))
-        most_slack = 0.5  # sampling intervals by which a time may lie outside those of a field
-        slack = most_slack * float(times[1] - times[0]) if len(times) > 1 else 0.0
+        slack = 0.5 * float(times[1] - times[0]) if len(times) > 1 else 0.0
         if not times[0] - slack <= time <= times[-1] + slack:
             raise ValueError(
                 f"time = {time:g} s is outside the times of the field, {times[0]:g} to "
@@ -135,10 +132,9 @@ class Field:
         """
         frames = [self.frame(time) for time in (self.times if times is None else times)]
         top = np.unique(self.mesh.facets["top"])
-        at_once = 32  # times at which velocity and strain are computed together
         units = {"displacement": "m", "velocity": "m/s", "strain": "1", "pressure": "Pa"}
-        for start in range(0, len(frames), at_once):
-            some = frames[start : start + at_once]
+        for start in range(0, len(frames), 32):
+            some = frames[start : start + 32]
             now = self.times[some]
             pressure = np.zeros((len(some), len(self.mesh.points)))
             pressure[:, top] = self.scene.pressure(self.mesh.points[top], now)
@@ -180,12 +176,11 @@ class Field:
         return ax
 
     def save(self, path: str | Path, frames: int | None = None, *, overwrite: bool = False) -> Path:
-        """Write a ParaView collection, `path` ending in .pvd, and a .vtu file of `grids` for each
-        time.
+        """Write a ParaView collection, and a .vtu file of `grids` for each time.
 
         Parameters
         ----------
-        path : str or Path
+        path : str or Path, ending in .pvd
         frames : int, number of evenly spaced times; all if not given
         overwrite : bool
 
@@ -256,9 +251,9 @@ def field(
 ) -> Field:
     """Compute the motion of a scene's whole body from rest.
 
-    The body is reduced to the subspace of the load along its path, so that the cost grows with the
-    length of the path, and another path needs another reduction. Warnings are in `effort.warnings`;
-    each is also issued as a `SkinwaveWarning`.
+    The body is reduced to the subspace of the load along its path. The cost grows with the length
+    of the path, and another path needs another reduction. Warnings are in `effort.warnings`, and
+    are issued as `SkinwaveWarning`.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ class Film:
 
 
 def film(
-    path: Path, views: Sequence[View], style: Style, progress: Progress | None = None, *,
+    path: Path, views: Sequence[View], style: Style, progress: Progress = silent, *,
     camera: str = "tilted", panel: tuple[int, int] | None = None,
 ) -> None:  # fmt: skip
     """Write a film of all frames of views, side by side.
@@ -50,18 +50,23 @@ def film(
     One period of a steady state repeats without a jump. Raises the errors of `check_format`.
     """
     check_format(path)
-    count, report = len(views[0].times), progress or silent
+    count = len(views[0].times)
 
     def frames() -> Iterator[Image]:
         with stage(views, style, camera=camera, panel=panel) as show:
             for k in range(count):
-                report("film", k / count)
+                progress("film", k / count)
                 yield show(k)
 
     if path.suffix == ".gif":
         _write_gif(path, list(frames()), style)
-    else:
-        _write_mp4(path, frames(), count)
+        return
+    import imageio.v2 as imageio
+
+    writer: Any
+    with imageio.get_writer(path, fps=count / duration(count), macro_block_size=16) as writer:
+        for frame in frames():
+            writer.append_data(frame)
 
 
 def check_format(path: Path) -> None:
@@ -111,12 +116,3 @@ def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
         path, save_all=True, append_images=shown[1:], loop=0, optimize=False,
         duration=round(100 * duration(len(frames)) / len(frames)) * 10,  # ms, in steps of ten
     )  # fmt: skip
-
-
-def _write_mp4(path: Path, frames: Iterator[Image], count: int) -> None:
-    import imageio.v2 as imageio
-
-    writer: Any
-    with imageio.get_writer(path, fps=count / duration(count), macro_block_size=16) as writer:
-        for frame in frames:
-            writer.append_data(frame)

@@ -62,7 +62,9 @@ def surfaces_figure(
     raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
     orange, pink = "#ff9e4a", "#ff2fd0"  # the kernel's -20 dB, the detection threshold
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
-        quantity, power = surface.quantity, _power_of_ten(surface.unit_rms)
+        quantity = surface.quantity
+        power = int(np.floor(np.log10(float(np.nanmax(surface.unit_rms)) or 1.0)))
+        power = 0 if -3 <= power < 4 else power  # numbers of the colour bar are short without it
         shown = np.maximum(_finer(surface.unit_rms), 0.0) / 10.0**power
         (left, right), (low, high) = 1e3 * surface.x[[0, -1]], 1e3 * surface.y[[0, -1]]
         beyond = (right - left) / (shown.shape[1] - 1) / 2  # half a pixel
@@ -115,12 +117,6 @@ def _outlined(ink: str) -> dict[str, Any]:
     edges = {"white": "0.4", "black": "white"}
     effects = [withStroke(linewidth=2.3, foreground=edges[ink])] if ink in edges else []
     return {"color": ink, "path_effects": effects}
-
-
-def _power_of_ten(values: Floats) -> int:
-    """Return the exponent of the unit of a colour bar, 0 if its numbers are short without."""
-    power = int(np.floor(np.log10(float(np.nanmax(values)) or 1.0)))
-    return 0 if -3 <= power < 4 else power
 
 
 def _finer(field: Floats, fewest: int = 250) -> Floats:

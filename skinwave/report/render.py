@@ -140,8 +140,7 @@ def stage(
     # Part of a panel that bodies fill, along its width and height, and the middle of that height.
     filled, middle = (0.92, 0.74), 0.44
     with new_plotter(style, (width, height), len(views)) as plotter:
-        limits, title = _colour_scale(views)
-        bar = _colour_bar(limits, title, style, letter, (column, height))
+        limits, bar = _colour_bar(views, style, letter, (column, height))
         panels = [make_panel(view, cut) for view in views]
         shown = [each for one in panels for each in (
             1e3 * one.view.points[one.nodes], scale_bar(1e3 * one.view.points)
@@ -177,31 +176,25 @@ def write(
 
 
 def _colour_bar(
-    limits: tuple[float, float], title: str, style: Style, letter: float, size: tuple[int, int]
-) -> Image:
-    """Return the picture of a colour bar of a size in pixels."""
+    views: Sequence[View], style: Style, letter: float, size: tuple[int, int]
+) -> tuple[tuple[float, float], Image]:
+    """Return the limits of the colour scale, and its picture of a size in pixels."""
+    shades = [view.shade for view in views if view.shade]
+    shown, most = views[0].quantity, views[0].quantity.per_unit * views[0].peak
+    if shades:
+        shown = quantity(shades[0].quantity)
+        most = shown.per_unit * max(float(np.abs(shade.values).max()) for shade in shades) or 1.0
+    is_relative = len(views) > 1 and not shades
+    most, title = (1.0, "over the\nlargest") if is_relative else (most, shown.shown)
+    limits = (0.0 if shades and shown.invariant is not None else -most, most)
     dpi = 72 * letter / style.font
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=(size[0] / dpi, size[1] / dpi))
         ax = figure.add_axes((0.1, 0.12, 0.18, 0.66))
-        shades = mpl.cm.ScalarMappable(Normalize(*limits), SIGNED if limits[0] else SEQUENTIAL)
-        figure.colorbar(shades, cax=ax, ticks=MaxNLocator(6, steps=[1, 2, 5, 10]))
+        scale = mpl.cm.ScalarMappable(Normalize(*limits), SIGNED if limits[0] else SEQUENTIAL)
+        figure.colorbar(scale, cax=ax, ticks=MaxNLocator(6, steps=[1, 2, 5, 10]))
         figure.text(0.1, 0.8, title, va="bottom", ha="left")
-        return raster(figure, dpi)
-
-
-def _colour_scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
-    """Return the limits of the colour scale, and its title."""
-    shades = [view.shade for view in views if view.shade]
-    if shades:
-        shown = quantity(shades[0].quantity)
-        most = shown.per_unit * max(float(np.abs(shade.values).max()) for shade in shades) or 1.0
-        return (-most if shown.invariant is None else 0.0, most), shown.shown
-    if len(views) > 1:
-        return (-1.0, 1.0), "over the\nlargest"
-    view = views[0]
-    most = view.quantity.per_unit * view.peak
-    return (-most, most), view.quantity.shown
+        return limits, raster(figure, dpi)
 
 
 def make_panel(view: View, cut: bool = False) -> Panel:

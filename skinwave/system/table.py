@@ -80,7 +80,12 @@ class Table:
         digits = [column.digits for column in self.columns]
         rows = [[cell_text(v, n) for v, n in zip(row, digits, strict=True)] for row in self.rows]
         titles = [column.title for column in self.columns]
-        return part("table", titles, rows, [_is_numeric(rows, k) for k in range(len(titles))])
+        filled = [{row[k] for row in rows} - {"-", ""} for k in range(len(titles))]
+        numeric = [
+            bool(cells) and all(re.sub("[,+.e-]", "", cell).isdigit() for cell in cells)
+            for cells in filled
+        ]
+        return part("table", titles, rows, numeric)
 
 
 def cell_text(value: Any, digits: int = 3) -> str:
@@ -92,12 +97,6 @@ def cell_text(value: Any, digits: int = 3) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:,}" if isinstance(value, int) else significant(float(value), digits)
-
-
-def _is_numeric(rows: Sequence[Sequence[str]], k: int) -> bool:
-    """Whether a column has numbers, and nothing else but "-" or empty cells."""
-    cells = {row[k] for row in rows} - {"-", ""}
-    return bool(cells) and all(re.sub("[,+.e-]", "", cell).isdigit() for cell in cells)
 
 
 def _is_known(value: Any) -> bool:

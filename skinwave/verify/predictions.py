@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 import fem
 from simple_model import MovingPressure, Tacton, Trajectory, threshold
-from simple_model.layers.dispersion import Mode
 from simple_model.layers.flat_body import steady_state
 from simple_model.layers.wavenumber_integral import point_response
 from simple_model.load.focus import NOMINAL_HEIGHT, lobe_width, spot_width
@@ -73,7 +72,10 @@ def leading_wave(body: Body, frequencies: Floats = USUAL.frequencies) -> Curves:
     slowest = 1e-3  # Hz, in place of 0, for the static speed of a half-space
     f = np.array([*[slowest] * (body.depth == inf), *frequencies])
     modes = dispersion(body, f, 6).modes
-    amplitudes = np.array([_amplitude(mode) for mode in modes])
+    edge, width = lobe_width(NOMINAL_HEIGHT), spot_width(NOMINAL_HEIGHT)
+    with np.errstate(invalid="ignore"):
+        amplitudes = np.abs([mode.amplitude(width, edge) for mode in modes])
+    amplitudes[~np.array([mode.is_wave for mode in modes]) | ~np.isfinite(amplitudes)] = 0.0
     if len(modes) == 1:  # the Rayleigh wave leads however strongly it decays
         amplitudes[:] = 1.0
     first, propagates = np.argmax(amplitudes, axis=0), amplitudes.max(axis=0) > 0
@@ -83,14 +85,6 @@ def leading_wave(body: Body, frequencies: Floats = USUAL.frequencies) -> Curves:
     )
     f = np.where(f == slowest, 0.0, f)
     return Curves(frequencies=f, mode=first, speed=speed, length=length)
-
-
-def _amplitude(mode: Mode) -> Floats:
-    """Return the amplitude (f,) of a mode, 0 where it is not a wave."""
-    edge, width = lobe_width(NOMINAL_HEIGHT), spot_width(NOMINAL_HEIGHT)
-    with np.errstate(invalid="ignore"):
-        amplitude = np.abs(mode.amplitude(width, edge))
-    return np.where(mode.is_wave & np.isfinite(amplitude), amplitude, 0.0)
 
 
 def decay_exponents(body: Body, frequencies: ArrayLike) -> Floats:

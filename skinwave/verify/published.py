@@ -6,6 +6,7 @@ by it; their agreement with it is no evidence.
 """
 
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -53,7 +54,7 @@ class Published:
     conditions: str
     source: str
     how: str
-    bodies: tuple[str, ...]
+    bodies: Sequence[str]
     built: tuple[str, ...] = ()
     areas: tuple[float, ...] = ()
     remark: str = ""
@@ -64,19 +65,19 @@ class Published:
         return (self.lows[k], self.highs[k]) if self.lows else (self.values[k], self.values[k])
 
     def at(self, frequency: float) -> tuple[float, float] | None:
-        """Return the same at a frequency in Hz, or None if the source does not have it."""
+        """Return both at a frequency in Hz, or None if the source does not have it."""
         equal = np.flatnonzero(np.isclose(self.frequencies, frequency))
         return self.between(int(equal[0])) if len(equal) else None
 
 
 def rayleigh_wave(modulus: float, viscosity: float, frequency: float) -> tuple[float, float]:
-    """Return the phase speed in m/s and 1/e length in m of Rayleigh waves in an incompressible
-    Kelvin-Voigt solid: k = w sqrt(rho/(mu1 + i w mu2)) / 0.9553.
+    """Return phase speed in m/s and 1/e length in m of Rayleigh waves in an incompressible solid.
+
+    By Voigt's law, k = w sqrt(rho / (mu1 + i w mu2)) / 0.9553.
     """
     w = 2 * np.pi * frequency
-    skin_density = 1000.0  # kg/m3
-    rayleigh = 0.955313  # speed of Rayleigh waves over that of shear waves, nu = 0.5
-    k = w * np.sqrt(skin_density / (modulus + 1j * w * viscosity)) / rayleigh
+    density, ratio = 1000.0, 0.955313  # kg/m3; speed of Rayleigh over that of shear waves
+    k = w * np.sqrt(density / (modulus + 1j * w * viscosity)) / ratio
     return float(w / k.real), float(1 / abs(k.imag))
 
 
@@ -91,26 +92,18 @@ def _read_published(table: dict[str, Any]) -> Published:
     }  # fmt: skip
     if attenuations := table.pop("attenuations", ()):
         numbers["values"] = tuple(quantity.size / x for x in attenuations)
-    if voigt := table.pop("voigt", None):
-        numbers = _by_voigt(frequencies, *voigt.values())
+    if voigt := table.pop("voigt", None):  # two constants, each a mean and a standard deviation
+        means = tuple(mean for mean, _ in voigt.values())
+        ends = product(*((mean - spread, mean + spread) for mean, spread in voigt.values()))
+        lengths = np.array([[rayleigh_wave(*each, f)[1] for f in frequencies]
+                            for each in (means, *ends)])  # fmt: skip
+        numbers = {"values": tuple(lengths[0]), "lows": tuple(lengths[1:].min(axis=0)),
+                   "highs": tuple(lengths[1:].max(axis=0))}  # fmt: skip
     return Published(
         quantity=quantity, frequencies=frequencies, bodies=tuple(table.pop("bodies")),
         built=tuple(table.pop("fitted", ())),
         areas=tuple(1e-4 * area for area in table.pop("areas_cm2", ())), **numbers, **table,
     )  # fmt: skip
-
-
-def _by_voigt(
-    frequencies: tuple[float, ...], *constants: tuple[float, float]
-) -> dict[str, tuple[float, ...]]:
-    """Return 1/e lengths from constants of Voigt's law, each a mean and a standard deviation."""
-    ends = list(product(*((mean - spread, mean + spread) for mean, spread in constants)))
-    spread = [[rayleigh_wave(mu, eta, f)[1] for mu, eta in ends] for f in frequencies]
-    (mu, _), (eta, _) = constants
-    return {
-        "values": tuple(rayleigh_wave(mu, eta, f)[1] for f in frequencies),
-        "lows": tuple(map(min, spread)), "highs": tuple(map(max, spread)),
-    }  # fmt: skip
 
 
 _FILE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
@@ -127,13 +120,8 @@ def all_sources(quantity: Quantity) -> Published:
     ranges = {f: [x for each in sets if (x := each.at(f))] for f in np.arange(100.0, 701, 100)}
     shared = {float(f): pairs for f, pairs in ranges.items() if len(pairs) > 1}
     return Published(
-        name=f"{ALL}: {quantity.name}", site="back of the hand, finger, forearm",
-        quantity=quantity, frequencies=tuple(shared), values=(np.nan,) * len(shared),
+        name=f"{ALL}: {quantity.name}", quantity=quantity, frequencies=tuple(shared),
+        values=(np.nan,) * len(shared), **_FILE["all_sources"],
         lows=tuple(min(low for low, _ in pairs) for pairs in shared.values()),
         highs=tuple(max(high for _, high in pairs) for pairs in shared.values()),
-        conditions="lowest to highest of the sources here, where at least two have the frequency",
-        source="the sets of this page", how="computed from the source's numbers",
-        bodies=("forearm", "palm", "palm-stiff", "skin-slab", "palm-layers", "forearm-layers"),
-        remark="Sites and methods differ, so the range is wider than between people at one site; "
-        "it includes sets that presets were fitted to",
     )  # fmt: skip
