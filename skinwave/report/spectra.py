@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from simple_model import spectrum, threshold
-from simple_model.quantities import DISPLACEMENT, Quantity
+from simple_model.quantities import Quantity
 from simple_model.threshold import BAND, HIGHEST, LOWEST
 from skinwave.report.figures import (
     REPORT,
@@ -40,17 +40,16 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     size = style.size(10.5, 1.05 * len(probes) + 1.3)
     figure = Figure(figsize=(size[0], 0.75 * len(probes) + 1.6) if narrow else size)
     axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
-    rows = _legend(figure, runs)
+    rows = _legend(figure, runs, _draw_waveforms(axes[:, 0], runs))
+    _draw_spectra(axes[:, 1], runs)
     # Fixed margins: a computed layout takes twice as long.
     inch = style.zoom / figure.get_figheight()
     left, right, between, top = (0.2, 0.97, 0.32, 0.75) if narrow else (0.08, 0.99, 0.14, 0.6)
     figure.subplots_adjust(
         left, 0.55 * inch, right, 1 - (top + 0.2 * rows) * inch, wspace=between, hspace=0.13
     )
-    for p, (x, y) in enumerate(probes):
-        _draw_waveforms(axes[p, 0], runs, p)
-        _draw_spectra(axes[p, 1], runs, p)
-        axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
+    for ax, (x, y) in zip(axes[:, 0], probes, strict=True):
+        ax.set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
     pad = None
     if narrow:
         titles = "waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line"
@@ -71,17 +70,15 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     return figure
 
 
-def _legend(figure: Figure, runs: list[Run]) -> int:
-    """Add an entry for each model above the figure, with the value of 1 on the waveform axis."""
+def _legend(figure: Figure, runs: list[Run], largest: list[float]) -> int:
+    """Add an entry for each model above the figure, with its largest motion."""
     entries: dict[str, dict[str, Any]] = {}
-    for run in runs:
-        scale = run.response.record.text(_largest(run, runs))
+    for run, most in zip(runs, largest, strict=True):
         style = line_style(run.column) | {"ls": dashes(run.column), "lw": 2}
-        entries[f"{run_label(run)}, 1 = {scale}"] = style
+        entries[f"{run_label(run)}, 1 = {run.response.record.text(most)}"] = style
     if kinds := dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
-        entries[f"open: {', '.join(kinds)}"] = {
-            "color": "0.3", "marker": "^", "mfc": "none", "ls": ""
-        }  # fmt: skip
+        mark = {"color": "0.3", "marker": "^", "mfc": "none", "ls": ""}
+        entries[f"open: {', '.join(kinds)}"] = mark
     columns = len(entries) if len(entries) <= 3 else -(-len(entries) // 2)
     letter, handle = 0.07, 0.5  # inch: of a letter of a legend, and of a handle with its space
     room = int(figure.get_figwidth() / (letter * max(map(len, entries)) + handle))
@@ -89,56 +86,49 @@ def _legend(figure: Figure, runs: list[Run]) -> int:
     return legend(figure, entries, columns, loc="upper center", fontsize=None)
 
 
-def _common_end(run: Run, runs: list[Run]) -> slice:
-    """Return the slice at the end that all runs have; records may begin at different times."""
-    times = run.response.times
-    end = min(float(other.response.times[-1]) for other in runs)
-    if end - SHOWN < times[0]:
-        end = max(float(times[0]) + SHOWN, end)
-    last = int(np.searchsorted(times, end + 0.5 * (times[1] - times[0])))
-    return slice(max(0, last - 1 - round(SHOWN / (times[1] - times[0]))), last)
+def _draw_waveforms(axes: Sequence[Axes], runs: list[Run], settle: float = 0.25) -> list[float]:
+    """Draw the end that all runs have at each probe, and return the largest motion of each run.
 
-
-def _remove_mean(run: Run, runs: list[Run], settle: float = 0.25) -> Floats:
-    """Return the drawn part (t, p) of the response about its mean after a part of it."""
-    motion = run.response.values
-    return motion[_common_end(run, runs)] - motion[int(settle * len(motion)) :].mean(axis=0)
-
-
-def _largest(run: Run, runs: list[Run]) -> float:
-    return float(np.abs(_remove_mean(run, runs)).max()) or 1.0
-
-
-def _draw_waveforms(ax: Axes, runs: list[Run], p: int) -> None:
+    Records may begin at different times. The mean is that after a part of the record.
+    """
+    largest, end = [], min(float(run.response.times[-1]) for run in runs)
     for run in runs:
-        centred = _remove_mean(run, runs)[:, p] / _largest(run, runs)
-        times = 1e3 * run.response.times[_common_end(run, runs)]
-        ax.plot(times, centred, ls=dashes(run.column), **_curve(run))
-    ax.margins(x=0)
-    ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
-    ax.set_ylim(-1.1, 1.1)
-    ax.grid(alpha=0.25)
+        times, motion = run.response.times, run.response.values
+        step, last = times[1] - times[0], end if end - SHOWN >= times[0] else times[0] + SHOWN
+        stop = int(np.searchsorted(times, max(last, end) + 0.5 * step))
+        shown = slice(max(0, stop - 1 - round(SHOWN / step)), stop)
+        centred = motion[shown] - motion[int(settle * len(motion)) :].mean(axis=0)
+        largest.append(float(np.abs(centred).max()) or 1.0)
+        for ax, values in zip(axes, centred.T / largest[-1], strict=True):
+            ax.plot(1e3 * times[shown], values, ls=dashes(run.column), **_curve(run))
+    for ax in axes:
+        ax.margins(x=0)
+        ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
+        ax.set_ylim(-1.1, 1.1)
+        ax.grid(alpha=0.25)
+    return largest
 
 
-def _draw_spectra(ax: Axes, runs: list[Run], p: int, floor: float = -80.0) -> None:
-    """Draw spectra and lines at a probe, down to a level in dB."""
+def _draw_spectra(axes: Sequence[Axes], runs: list[Run], floor: float = -80.0) -> None:
+    """Draw spectra and lines at each probe, down to a level in dB."""
     lowest_shown = 8.0  # Hz: the mean and its leakage lie below
     for run in runs:
         f, amplitude = spectrum(run.response, "blackmanharris")
-        moving = f > lowest_shown
-        top = max(float(amplitude[moving].max()), np.finfo(float).tiny)
-        level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
-        style = _curve(run)
-        ax.plot(f[moving], level, alpha=0.6, **(style | {"lw": style["lw"] - 0.3}))
-        lines = [(f, run.table.amplitudes[name][p]) for name, f in run.line_hz.items()]
-        peaks = [(peak.frequency, peak.amplitudes[p]) for peak in run.unnamed]
-        for points, face in ((lines, colour(run.column)), (peaks, "none")):
-            at, size = np.array(points).reshape(-1, 2).T  # may be empty
-            height = 20 * np.log10(np.maximum(size / top, 1e-12))
-            above, mark = height > floor, marker(run.column)
-            ax.plot(at[above], height[above], ls="", marker=mark, ms=4, mfc=face, **style)
-    ax.set(xlim=(0, HIGHEST_SHOWN), ylim=(floor, 5), yticks=np.arange(floor, 1, 20))
-    ax.grid(alpha=0.25)
+        f, amplitude = f[f > lowest_shown], amplitude[f > lowest_shown]
+        top, style = max(float(amplitude.max()), np.finfo(float).tiny), _curve(run)
+        for p, ax in enumerate(axes):
+            level = 20 * np.log10(np.maximum(amplitude[:, p] / top, 1e-12))
+            ax.plot(f, level, alpha=0.6, **(style | {"lw": style["lw"] - 0.3}))
+            lines = [(hz, run.table.amplitudes[name][p]) for name, hz in run.line_hz.items()]
+            peaks = [(peak.frequency, peak.amplitudes[p]) for peak in run.unnamed]
+            for points, face in ((lines, colour(run.column)), (peaks, "none")):
+                at, size = np.array(points).reshape(-1, 2).T  # may be empty
+                height = 20 * np.log10(np.maximum(size / top, 1e-12))
+                above, mark = height > floor, marker(run.column)
+                ax.plot(at[above], height[above], ls="", marker=mark, ms=4, mfc=face, **style)
+    for ax in axes:
+        ax.set(xlim=(0, HIGHEST_SHOWN), ylim=(floor, 5), yticks=np.arange(floor, 1, 20))
+        ax.grid(alpha=0.25)
 
 
 def _curve(run: Run) -> dict[str, Any]:
@@ -151,23 +141,21 @@ def _curve(run: Run) -> dict[str, Any]:
 def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
     """Draw the lines at one probe and, for skin, the detection threshold over frequency.
 
-    Each run of a body has its own panel.
+    Each run of a body has its own panel; at least one run is needed.
     """
     runs = [run for run in runs if run.response.record.of_body]
-    count, narrow = max(len(runs), 1), style.is_narrow
+    count, narrow = len(runs), style.is_narrow
     size = style.size(5.2 * count, 4.6)
     size = (size[0], 3.0 * count + 0.5) if narrow else size
     figure = Figure(figsize=size, layout="constrained")
     shape = (count, 1) if narrow else (1, count)
     axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel()
     width = 72 * size[0] / shape[1] - 8 * style.font  # points
-    for ax, run in zip(axes, runs, strict=False):
+    for ax, run in zip(axes, runs, strict=True):
         _draw_levels(ax, run, probe, width)
-    if runs:
-        low, high = _level_limits([*axes])
-        axes[0].set_ylim(low, high)
-        if low > 1e-4:  # written without an exponent
-            axes[0].yaxis.set_major_formatter("{x:g}")
+    axes[0].set_ylim(*_level_limits([*axes]))
+    if axes[0].get_ylim()[0] > 1e-4:  # written without an exponent
+        axes[0].yaxis.set_major_formatter("{x:g}")
     entries: dict[str, dict[str, Any]] = {}
     if any(run.is_skin for run in runs):
         entries["threshold for a focal spot"] = CURVE
@@ -176,8 +164,7 @@ def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
         entries[f"open: {kind}"] = {"color": "0.3", "marker": "o", "mfc": "none", "ls": ""}
     if entries:
         legend(figure, entries)
-    x, y = 1e3 * runs[0].response.probes[probe] if runs else (0.0, 0.0)
-    quantity = runs[0].response.record if runs else DISPLACEMENT
+    (x, y), quantity = 1e3 * runs[0].response.probes[probe], runs[0].response.record
     between = "\n" if style.columns else " "  # printed figures are small beside their letters
     for ax in axes if narrow else axes[:1]:
         ax.set_ylabel(f"{quantity.words}{between}at ({x:g}, {y:g}) mm, {quantity.shown} peak")
@@ -242,16 +229,9 @@ def _level_limits(axes: Sequence[Axes]) -> tuple[float, float]:
 
 @with_style
 def lines_figure(
-    lines: Mapping[str, float],
-    places: Floats,
-    measured: np.ndarray,
-    error: Floats,
-    models: Mapping[str, np.ndarray],
-    differs: Mapping[str, np.ndarray],
-    quantity: Quantity,
-    *,
-    style: Style = REPORT,
-) -> Figure:
+    lines: Mapping[str, float], places: Floats, measured: np.ndarray, error: Floats,
+    models: Mapping[str, np.ndarray], differs: Mapping[str, np.ndarray], quantity: Quantity,
+) -> Figure:  # fmt: skip
     """Draw amplitudes and phases of the strongest measured lines at each place, with models.
 
     Parameters
@@ -262,11 +242,9 @@ def lines_figure(
     error : (f, p) float, standard errors of amplitudes, SI units; nan if unknown
     models : (f, p) complex by `Run.column`, with gain and delay, SI units
     differs : (f, p) bool by `Run.column`, where the difference exceeds the noise
-    quantity : Quantity
-    style : Style
     """
     strongest = np.sort(np.argsort(-np.abs(measured).max(axis=1), kind="stable")[:MOST_LINES])
-    figure = Figure(figsize=style.size(10.5, 1.45 * len(strongest) + 1.7), layout="constrained")
+    figure = Figure(figsize=REPORT.size(10.5, 1.45 * len(strongest) + 1.7), layout="constrained")
     axes = figure.subplots(len(strongest), 2, sharex=True, squeeze=False)
     shift = 0.12  # of the distance between two places, by which models are drawn apart
     for (left, right), k in zip(axes, strongest, strict=True):
