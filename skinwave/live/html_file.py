@@ -1,7 +1,5 @@
 """The live page: one self-contained HTML file of template, styles, ES modules and data."""
 
-import hashlib
-from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -21,7 +19,7 @@ from skinwave.scene.scene import BODIES, Body, Scene, body_name
 from skinwave.system.effort import Progress, silent
 from skinwave.system.failures import failure_text, or_failed
 from skinwave.system.formats import MEASUREMENTS, suffixes
-from skinwave.system.scripts import bundle, json_for_script
+from skinwave.system.scripts import bundle, digest, json_for_script
 from skinwave.system.templates import render
 
 TITLE = "skinwave: waves in skin and paper under mid-air ultrasound haptics"
@@ -42,10 +40,9 @@ def page(data: Mapping[str, Any], title: str = TITLE) -> str:
 
 def policy(script: str, *, served: bool = False) -> str:
     """Return the content security policy: one script, requests only to the page's own server."""
-    digest = b64encode(hashlib.sha256(script.encode()).digest()).decode()
     own = "'self'" if served else "'none'"
     return (
-        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
+        f"default-src 'none'; script-src {digest(script)}; style-src 'unsafe-inline'; "
         "img-src data: blob:; media-src data: blob:; worker-src blob:; "
         f"connect-src {own}; base-uri 'none'; form-action 'none'"
     )

@@ -32,7 +32,8 @@ def model_paragraphs(runs: Sequence[Run]) -> list[str]:
     notes = dict.fromkeys(run.scene.pressure.law.note for run in on_bodies if run.is_am)
     by_device = any(run.scene.load.of_kind.is_of_device for run in on_bodies)
     uncertain = (
-        "The pressure at the focus, and so every displacement, is known only within a factor of 2."
+        "The pressure at the focus, and so every displacement, is known only to within a factor of "
+        "2."
     )
     return [*map(_model_text, groups.values()), *filter(None, notes), *[uncertain] * by_device]
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from simple_model.numbers import significant
-from skinwave.report.palette import COLOURS, SPARE
+from skinwave.report.palette import COLUMNS, SPARE, colour
 from skinwave.report.render import Image, stage
 from skinwave.report.renderer import renderer
 from skinwave.report.styles import Style
@@ -47,9 +47,8 @@ def film(
 ) -> None:  # fmt: skip
     """Write a film of all frames of views, side by side.
 
-    One period of a steady state repeats without a jump. Raises the errors of `check_format`.
+    One period of a steady state repeats without a jump. `check_format` must accept the path.
     """
-    check_format(path)
     count = len(views[0].times)
 
     def frames() -> Iterator[Image]:
@@ -103,8 +102,8 @@ def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
     from PIL import Image as Pillow
 
     some = Pillow.fromarray(np.concatenate(frames[:: max(1, len(frames) // 4)]))
-    page = [style.paper, style.ink, *COLOURS.values(), *SPARE]
-    exact = [int(colour[k : k + 2], 16) for colour in page for k in (1, 3, 5)]
+    page = [style.paper, style.ink, *(colour(column) for column in COLUMNS), *SPARE]
+    exact = [int(shade[k : k + 2], 16) for shade in page for k in (1, 3, 5)]
     palette = Pillow.new("P", (1, 1))
     chosen = some.quantize(240, kmeans=1).getpalette() or []  # beside the exact ones
     palette.putpalette(exact + chosen)

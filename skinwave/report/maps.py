@@ -15,7 +15,7 @@ from simple_model import MovingPressure
 from simple_model.load.path_cells import path_cells
 from simple_model.quantities import DISPLACEMENT, PRESSURE
 from skinwave.report.figures import REPORT, legend, panels, with_style
-from skinwave.report.palette import COLOURS, SEQUENTIAL, SIGNED, ink_colour, label
+from skinwave.report.palette import SEQUENTIAL, SIGNED, colour, ink_colour, label
 from skinwave.report.styles import Style
 from skinwave.results.propagation import NEAR, OUTSIDE, mach_angle
 from skinwave.results.surface import SurfaceField
@@ -76,10 +76,10 @@ def surfaces_figure(
         borders = [(surface, NEAR, "white", "solid", f"{NEAR:g} dB")]
         if kernel is not None:
             borders.insert(0, (kernel, OUTSIDE, orange, "dashed", f"kernel's {OUTSIDE:g} dB"))
-        for field, drop, colour, dashes, name in borders:
+        for field, drop, ink, dashes, name in borders:
             level = np.nanmax(field.rms) * 10 ** (drop / 20)
-            if _draw_border(ax, field, field.rms, level, colour, dashes):
-                entries[name] = {**_outlined(colour), "ls": dashes}
+            if _draw_border(ax, field, field.rms, level, ink, dashes):
+                entries[name] = {**_outlined(ink), "ls": dashes}
         level_map = surface.level
         if level_map is not None and _draw_border(ax, surface, level_map, 0.0, pink, "solid"):
             entries["detection threshold"] = {"color": pink, "ls": "solid"}
@@ -93,7 +93,7 @@ def surfaces_figure(
         figure.colorbar(image, ax=ax, label=title, extend=extend)
     if measured:
         entries["measured, in the map's colours"] = {
-            "ls": "", "marker": "s", "mfc": "0.8", "mec": COLOURS["measured"], "ms": 8
+            "ls": "", "marker": "s", "mfc": "0.8", "mec": colour("measured"), "ms": 8
         }  # fmt: skip
     legend(figure, entries)
     return figure
@@ -162,7 +162,7 @@ def _draw_measured(
     within = ((measured.places >= low) & (measured.places <= high)).all(axis=1)
     x, y = 1e3 * measured.places[within].T
     style: dict[str, Any] = {
-        "marker": "s", "s": 62, "linewidths": 1.4, "zorder": 5, "edgecolors": COLOURS["measured"]
+        "marker": "s", "s": 62, "linewidths": 1.4, "zorder": 5, "edgecolors": colour("measured")
     }  # fmt: skip
     if surface.quantity is not DISPLACEMENT:
         ax.scatter(x, y, **style, facecolors="none")

@@ -12,19 +12,21 @@ from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 BLUE, ORANGE = "#0072B2", "#D55E00"
 SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 SERIES = (BLUE, ORANGE, *SPARE)  # of other curves
-COLOURS = {
-    **{model.name: model.colour for model in (SAME_LOAD, PUBLISHED)},
-    "paper-sheet": ORANGE,
-    "skin-slab": BLUE,
-    "palm": SPARE[0],
-    "measured": "#CC79A7",
+COLUMNS = {  # label, colour and marker of each `Run.column` that has its own
+    SAME_LOAD.name: (SAME_LOAD.label, SAME_LOAD.colour, "o"),
+    PUBLISHED.name: (PUBLISHED.label, PUBLISHED.colour, "x"),
+    "paper-sheet": ("paper sheet", ORANGE, "s"),
+    "paper-sheet-loose": ("loose sheet", "", "^"),
+    "skin-slab": ("skin slab", BLUE, "^"),
+    "palm": ("palm", SPARE[0], "^"),
+    "measured": ("measured", "#CC79A7", "D"),
 }
 SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # colour maps of quantities with and without a sign
 
 
 def colour(column: str) -> str:
     """Return the colour of a `Run.column`."""
-    return COLOURS.get(column) or SPARE[sum(map(ord, column)) % len(SPARE)]
+    return COLUMNS.get(column, ("", ""))[1] or SPARE[sum(map(ord, column)) % len(SPARE)]
 
 
 def ink_colour(column: str) -> str:
@@ -35,8 +37,7 @@ def ink_colour(column: str) -> str:
 
 def marker(column: str) -> str:
     """Return the marker of a `Run.column`."""
-    markers = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
-    return markers.get(column, "^")
+    return COLUMNS[column][2] if column in COLUMNS else "^"
 
 
 def line_style(column: str) -> dict[str, Any]:
@@ -51,10 +52,4 @@ def dashes(column: str) -> Any:
 
 def label(column: str) -> str:
     """Return the name of a `Run.column` in legends and tables."""
-    by_name = {
-        **{model.name: model.label for model in (SAME_LOAD, PUBLISHED)},
-        "paper-sheet": "paper sheet",
-        "paper-sheet-loose": "loose sheet",
-        "skin-slab": "skin slab",
-    }
-    return by_name.get(column, column)
+    return COLUMNS[column][0] if column in COLUMNS else column

@@ -1,6 +1,5 @@
 """A page with a view that can be rotated in a browser, with the code of the live page."""
 
-import base64
 from importlib import resources
 from typing import Any
 
@@ -10,7 +9,7 @@ from simple_model import MovingPressure
 from skinwave.report.palette import label
 from skinwave.report.render import outer_surface
 from skinwave.results.views import View
-from skinwave.system.arrays import quantise
+from skinwave.system.arrays import base64_text, quantise
 from skinwave.system.scripts import bundle, json_for_script
 from skinwave.system.templates import render
 from skinwave.typing import Complex, Floats
@@ -24,8 +23,8 @@ def turntable(view: View, frame: int) -> str:
     data = {
         "title": label(view.column), "unit": view.quantity.unit, "period": view.period,
         "time": float(view.times[frame]), "frequencies": frequencies.tolist(),
-        "motion": quantise(upwards), "points": _binary(1e3 * view.points[nodes], "<f4"),
-        "triangles": _binary(triangles, "<u4"), "path": paths.tolist(), "foci": foci.tolist(),
+        "motion": quantise(upwards), "points": base64_text(1e3 * view.points[nodes], "<f4"),
+        "triangles": base64_text(triangles, "<u4"), "path": paths.tolist(), "foci": foci.tolist(),
         "probes": view.scene.probe_points[:, :2].tolist(),
     }  # fmt: skip
     static = resources.files("skinwave") / "static"
@@ -64,7 +63,3 @@ def focus_places(pressure: MovingPressure, times: Floats) -> tuple[Floats, Float
     within = np.mod(tacton.drawing_frequency * times, 1.0) / n  # each focus stays on its own path
     foci = [path.at_phase((within + phase) % 1) for phase in tacton.foci]
     return paths, np.stack(foci, axis=1)
-
-
-def _binary(values: Any, kind: str) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()

@@ -11,7 +11,7 @@ Packed = dict[str, Any]
 def pack(values: np.ndarray) -> Packed:
     """Encode real or complex rows (n, m) as 64-bit floats in base 64."""
     rows = np.atleast_2d(values)
-    found = {"shape": list(rows.shape), "f8": _text(_parts(rows).astype("<f8"))}
+    found = {"shape": list(rows.shape), "f8": base64_text(_parts(rows), "<f8")}
     return found if np.iscomplexobj(rows) else found | {"real": True}
 
 
@@ -24,7 +24,7 @@ def quantise(values: np.ndarray, bits: int = 16) -> Packed:
     largest = np.maximum(np.abs(parts).reshape(len(values), -1).max(axis=1), 1e-300)
     steps = largest / (2 ** (bits - 1) - 1)
     whole = np.rint(parts / steps.reshape(-1, *(1,) * (parts.ndim - 1))).astype("<i2")
-    encoded = {"i2": _text(whole)} if bits == 16 else {"i12": _letters(whole)}
+    encoded = {"i2": base64_text(whole, "<i2")} if bits == 16 else {"i12": _letters(whole)}
     found = {"shape": list(values.shape), "scale": steps.tolist()} | encoded
     return found if np.iscomplexobj(values) else found | {"real": True}
 
@@ -34,8 +34,9 @@ def _parts(values: np.ndarray) -> np.ndarray:
     return np.stack([values.real, values.imag], -1) if np.iscomplexobj(values) else values
 
 
-def _text(values: np.ndarray) -> str:
-    return base64.b64encode(values.tobytes()).decode()
+def base64_text(values: np.ndarray, kind: str) -> str:
+    """Return the bytes of an array of a kind, such as "<f8", in base 64."""
+    return base64.b64encode(values.astype(kind).tobytes()).decode()
 
 
 def _letters(whole: np.ndarray) -> str:
@@ -43,4 +44,4 @@ def _letters(whole: np.ndarray) -> str:
     pairs = np.append(whole.ravel(), 0)[: whole.size + whole.size % 2].astype(np.uint16) + 2048
     one, other = (pairs.reshape(-1, 2).T).astype(np.uint32)
     three = np.stack([one >> 4, (one & 15) << 4 | other >> 8, other & 255], axis=1)
-    return base64.b64encode(three.astype(np.uint8).tobytes()).decode()[: 2 * whole.size]
+    return base64_text(three, "u1")[: 2 * whole.size]

@@ -4,7 +4,6 @@ Parts are text (a paragraph each), `Table`, `Picture`, `Section`, `Details`, `Ch
 The templates escape all text except `Markup`, which is made only from templates and literals.
 """
 
-import hashlib
 import re
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -16,6 +15,7 @@ from markupsafe import Markup
 
 from simple_model import Effort
 from skinwave.system.failures import failure_text
+from skinwave.system.scripts import digest
 from skinwave.system.table import Table
 from skinwave.system.templates import part, render, typeset
 
@@ -198,6 +198,5 @@ def _policy(body: Markup) -> str:
     inner = re.findall(r'<iframe [^>"]*"allow-scripts"[^>]* srcdoc="([^"]*)"', body)
     script = re.compile(r"<script\b[^>]*>(.*?)</script\s*>", re.DOTALL | re.IGNORECASE)
     scripts = (each for page in inner for each in script.findall(unescape(page)))
-    digests = (b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
-    allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    allowed = " ".join(map(digest, scripts))
     return f"{policy}; script-src {allowed}" if allowed else policy

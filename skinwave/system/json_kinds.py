@@ -36,11 +36,10 @@ def is_finite_number(value: Any) -> bool:
 
 
 def effort_of(table: Any, errors: Any, where: str) -> Effort:
-    """Return the effort in a table of a JSON file, with the `errors` of its record.
+    """Return the effort in a table that fits `EFFORT`, with the `errors` of its record.
 
-    Raises a ValueError for other contents.
+    Raises a ValueError for unknown keys, and for other contents of the errors.
     """
-    fitting(table, EFFORT, where)
     parts = [{"name": str, "source": str, "error": float | None, "cure": str}]
     statement = Statement.of_errors(fitting(errors, parts, where))
     if unknown := table.keys() - {key.removesuffix("?") for key in EFFORT}:

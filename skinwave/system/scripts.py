@@ -3,8 +3,10 @@
 Each module becomes a function that returns its exports, in the order of their dependencies.
 """
 
+import hashlib
 import json
 import re
+from base64 import b64encode
 from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
 from importlib.resources.abc import Traversable
@@ -15,6 +17,11 @@ _EXPORT = re.compile(
     r"^export\s+((?:async\s+)?function\s*\*?\s*|class\s+|const\s+)([\w$]+)", re.MULTILINE
 )
 _NAME = re.compile(r"([\w$]+)(?:\s+as\s+([\w$]+))?")
+
+
+def digest(script: str) -> str:
+    """Return the source of a script in a content security policy: its digest."""
+    return f"'sha256-{b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
 def json_for_script(data: Mapping[str, Any]) -> str:

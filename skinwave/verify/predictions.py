@@ -1,6 +1,6 @@
 """Predictions of published quantities by presets for skin."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from math import inf
@@ -159,26 +159,13 @@ def peak(x: Floats, y: Floats) -> float:
     return float(x[k] + step * (before - after) / (before - 2 * here + after) / 2)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Finger:
-    """1/e lengths (f,) in m along a finger at frequencies (f,) in Hz; dofs of the hand's mesh."""
-
-    frequencies: Floats
-    lengths: Floats
-    dofs: int
-
-
 def along_finger(
-    file: Path,
-    report: Progress,
-    frequencies: tuple[float, ...] = (200.0, 300.0, 400.0),
-    up: str = "-x",
-    h: float = 6.5e-3,
-) -> Finger:
-    """Return the decay on the palmar side of the longest finger of a hand, by finite elements.
+    file: Path, report: Progress, frequencies: Sequence[float], up: str = "-x", h: float = 6.5e-3
+) -> Floats:
+    """Return 1/e lengths (f,) in m on the palmar side of the longest finger of a hand.
 
-    The palm in the `file` faces `up`. Elements of 5 and 8 mm instead of `h`, in m, change the
-    lengths by up to 8 %. Raises a ValueError if the file is missing or contains no body.
+    Finite elements of size `h` in m compute them; 5 and 8 mm change them by up to 8 %. The palm in
+    the `file` faces `up`. Raises a ValueError if the file is missing or contains no body.
     """
     if not file.is_file():
         raise ValueError(f"--hand {file} does not exist; give the mesh file of a hand")
@@ -203,4 +190,4 @@ def along_finger(
         report(f"solve {f:g} Hz", 0.2 + 0.8 * k / len(frequencies))
         amplitudes.append(np.abs(S @ fem.harmonic(matrices, load, [f])[0]))
     slopes = np.polyfit(distances, np.log(amplitudes).T, 1)[0]
-    return Finger(frequencies=np.array(frequencies), lengths=-1 / slopes, dofs=len(matrices.free))
+    return -1 / slopes

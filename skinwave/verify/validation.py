@@ -19,7 +19,7 @@ from skinwave.system.document import Details, Part, Picture, Report, Section, co
 from skinwave.system.effort import Progress, silent
 from skinwave.system.table import Column, Table
 from skinwave.verify import predictions
-from skinwave.verify.predictions import BODIES, USUAL, Curves, Finger, Samples, peak
+from skinwave.verify.predictions import BODIES, USUAL, Curves, Samples, peak
 from skinwave.verify.published import (
     ALL,
     CONTACTS,
@@ -100,7 +100,8 @@ def validate(
 
     With the file of a `hand`, rows include the decay along its finger, by finite elements.
     """
-    of_hand = compare_finger(predictions.along_finger(hand, report)) if hand else []
+    f = (200.0, 300.0, 400.0)
+    of_hand = compare_finger(f, predictions.along_finger(hand, report, f)) if hand else []
     report("waves", 0.02)
     curves = {name: predictions.leading_wave(body, samples.frequencies)
               for name, body in BODIES.items()}  # fmt: skip
@@ -146,14 +147,13 @@ def _predicted(
     return {"": curves[name].at(each.quantity, f)}
 
 
-def compare_finger(finger: Finger) -> list[Compared]:
-    """Return rows of a finger and the people of SkinSource, at the finger's frequencies."""
-    at = [SKINSOURCE.frequencies.index(f) for f in finger.frequencies]
-    own = replace(
-        SKINSOURCE, frequencies=tuple(finger.frequencies), values=(nan,) * len(at),
-        lows=tuple(SKINSOURCE.lows[k] for k in at), highs=tuple(SKINSOURCE.highs[k] for k in at),
-    )  # fmt: skip
-    return compare_set(own, HAND, finger.lengths)
+def compare_finger(frequencies: Sequence[float], lengths: Iterable[float]) -> list[Compared]:
+    """Return rows of lengths (f,) in m along a finger and of the people of SkinSource."""
+    lows, highs = zip(*(SKINSOURCE.between(SKINSOURCE.frequencies.index(f)) for f in frequencies),
+                      strict=True)  # fmt: skip
+    own = replace(SKINSOURCE, frequencies=tuple(frequencies), values=(nan,) * len(lows), lows=lows,
+                  highs=highs)  # fmt: skip
+    return compare_set(own, HAND, lengths)
 
 
 def verdict(rows: Sequence[Compared]) -> list[str]:
