@@ -76,16 +76,14 @@ def _sheet_text(runs: list[Run]) -> str:
         sentences.append(
             "The mesh is a thicker sheet of the same bending stiffness and mass per area."
         )
-    around = (
-        "it flows around the edges" if body.air == "free"
-        else "a wall around the sheet separates both sides"
-    )  # fmt: skip
-    sentences.append(
-        "Air on both sides moves with the sheet, and takes energy by friction and sound; "
-        f"{around}." if body.air else
-        "Left out: the air that moves with the sheet, which has a fifth to a third of the mass "
-        "of office paper."
-    )  # fmt: skip
+    moving = "Air on both sides moves with the sheet, and takes energy by friction and sound; "
+    by_air = {
+        "free": f"{moving}it flows around the edges.",
+        "baffle": f"{moving}a wall around the sheet separates both sides.",
+        False: "Left out: the air that moves with the sheet, which has a fifth to a third of the "
+        "mass of office paper.",
+    }
+    sentences.append(by_air[body.air])
     if not model.is_nonlinear and all(run.is_motion for run in runs):
         sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / body.depth
         sentences.append(

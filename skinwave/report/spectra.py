@@ -40,8 +40,8 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     size = style.size(10.5, 1.05 * len(probes) + 1.3)
     figure = Figure(figsize=(size[0], 0.75 * len(probes) + 1.6) if narrow else size)
     axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
-    rows = _legend(figure, runs, _draw_waveforms(axes[:, 0], runs))
-    _draw_spectra(axes[:, 1], runs)
+    rows = _legend(figure, runs, _draw_waveforms([*axes[:, 0]], runs))
+    _draw_spectra([*axes[:, 1]], runs)
     # Fixed margins: a computed layout takes twice as long.
     inch = style.zoom / figure.get_figheight()
     left, right, between, top = (0.2, 0.97, 0.32, 0.75) if narrow else (0.08, 0.99, 0.14, 0.6)
@@ -60,8 +60,8 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
             "spectrum, dB re the model's largest line",
         )
         pad, frequencies = 4 + rows_height(1), runs[0].frequencies
-        marked = (n for n in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") if n in frequencies)
-        lines = {name: frequencies[name] for name in marked}
+        marked = "f_AM", "2f_AM", "f_d", "2f_d", "3f_d"
+        lines: dict[str, float] = {n: frequencies[n] for n in marked if n in frequencies}
         name_lines(axes[0, 1], lines, 72 * axes[0, 1].get_position().width * size[0])
     axes[0, 0].set_title(f"{title}\n{titles[0]}", fontsize="medium", parse_math=False)
     axes[0, 1].set_title(titles[1], fontsize="medium", pad=pad)

@@ -1,6 +1,7 @@
 """Arrays as text in JSON: 64-bit floats, or integers of 16 or 12 bits with a scale for each row."""
 
 import base64
+from string import ascii_lowercase, ascii_uppercase, digits
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,6 @@ def base64_text(values: np.ndarray, kind: str) -> str:
 
 def _letters(whole: np.ndarray) -> str:
     """Return integers of 12 bits as two letters of base 64 each."""
-    pairs = np.append(whole.ravel(), 0)[: whole.size + whole.size % 2].astype(np.uint16) + 2048
-    one, other = (pairs.reshape(-1, 2).T).astype(np.uint32)
-    three = np.stack([one >> 4, (one & 15) << 4 | other >> 8, other & 255], axis=1)
-    return base64_text(three, "u1")[: 2 * whole.size]
+    alphabet = np.frombuffer(f"{ascii_uppercase}{ascii_lowercase}{digits}+/".encode(), np.uint8)
+    positive = whole.ravel() + 2048
+    return alphabet[np.column_stack([positive >> 6, positive & 63])].tobytes().decode()

@@ -20,7 +20,7 @@ from skinwave.bodies.analytic import compliance, dispersion
 from skinwave.bodies.build import build, operators
 from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.system.effort import Progress
-from skinwave.typing import Complex, Floats, Ints
+from skinwave.typing import Array, Complex, Floats, Ints
 from skinwave.verify.published import SPEED, Quantity
 
 # Half-spaces of one material, and layers on bone.
@@ -149,7 +149,7 @@ def deflections(
     return np.max(courses, axis=1), np.ptp(courses, axis=1)
 
 
-def peak(x: Floats, y: Floats) -> float:
+def peak(x: Array, y: Array) -> float:
     """Return the peak of a parabola through the highest point; nan at an end."""
     k = int(np.argmax(y))
     if not 0 < k < len(x) - 1:

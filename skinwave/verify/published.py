@@ -95,8 +95,8 @@ def _read_published(table: dict[str, Any]) -> Published:
     if voigt := table.pop("voigt", None):  # two constants, each a mean and a standard deviation
         means = tuple(mean for mean, _ in voigt.values())
         ends = product(*((mean - spread, mean + spread) for mean, spread in voigt.values()))
-        lengths = np.array([[rayleigh_wave(*each, f)[1] for f in frequencies]
-                            for each in (means, *ends)])  # fmt: skip
+        lengths = np.array([[rayleigh_wave(mu, eta, f)[1] for f in frequencies]
+                            for mu, eta in (means, *ends)])  # fmt: skip
         numbers = {"values": tuple(lengths[0]), "lows": tuple(lengths[1:].min(axis=0)),
                    "highs": tuple(lengths[1:].max(axis=0))}  # fmt: skip
     return Published(

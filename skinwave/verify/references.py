@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy.integrate import simpson, solve_bvp, solve_ivp
+from scipy.integrate import simpson, solve_bvp
 from scipy.linalg import eigh
 from scipy.optimize import brentq
-from scipy.special import ive, jv
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc, ive, jv
 
 from skinwave.typing import Array
 
@@ -211,18 +211,17 @@ def driven_oscillator(
 def elastica(load: float) -> tuple[float, float]:
     """Return the tip deflection and shortening of a cantilever over its length.
 
-    The load is P L^2 / E I. Shooting solves theta'' = -load cos(theta). Mattiasson gives 0.30172
-    and 0.05643 at 1.
+    The load is P L^2 / E I: elliptic integrals of parameter m, amplitude arcsin 1 / sqrt(2 m) and
+    K(m) - F = sqrt(load). Mattiasson gives 0.30172 and 0.05643 at 1.
     """
 
-    def bent(tip: float) -> Array:
-        def slope(s: float, y: Array) -> list[float]:
-            return [y[1], -load * np.cos(y[0]), np.sin(y[0]), np.cos(y[0])]
+    def amplitude(m: float) -> float:
+        return float(np.arcsin(1 / np.sqrt(2 * m)))
 
-        return solve_ivp(slope, (1, 0), [tip, 0, 0, 0], rtol=1e-11, atol=1e-12).y[:, -1]
-
-    end = bent(brentq(lambda tip: bent(tip)[0], 1e-9, np.pi / 2, xtol=1e-13))
-    return -float(end[2]), 1 + float(end[3])
+    root = np.sqrt(load)
+    m = brentq(lambda m: ellipk(m) - ellipkinc(amplitude(m), m) - root, 0.5, 1 - 1e-12, xtol=1e-15)
+    deflection = 1 - 2 * (ellipe(m) - ellipeinc(amplitude(m), m)) / root
+    return float(deflection), float(1 - 2 * np.sqrt(m) * np.cos(amplitude(m)) / root)
 
 
 def karman_disc(load: float, poisson: float) -> float:
