@@ -8,7 +8,6 @@ import numpy as np
 import fem
 import meshes
 from fem import nonlinear
-from fem.load_and_probe import facet_geometry
 from meshes import TetMesh
 from simple_model import MovingPressure, Tacton
 from skinwave.models.stretching import meshed_sheet, stretching_body
@@ -33,9 +32,7 @@ def elastica() -> Checks:
     material = fem.from_young(density=1, young=1e9, poisson=0.0)
     mesh = meshes.extrude(np.linspace(0, 1, 21), [0, width], [-thickness, 0])
     body = fem.finite_strain(mesh, material, fixed={"left": "xyz"})
-    N, normals = facet_geometry(mesh.points[mesh.facets["right"]])
-    share = np.zeros(len(mesh.points))
-    np.add.at(share, mesh.facets["right"], np.einsum("qa,eqi->ea", N, normals))
+    share = np.asarray(fem.pressure_operator(mesh, "right").sum(axis=1))[::3]
     share /= share.sum()
     for load in (0.5, 1.0):
         force = np.zeros((len(mesh.points), 3))
