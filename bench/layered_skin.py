@@ -147,7 +147,7 @@ def main(*arguments: str) -> None:
         sets = [each for each in WAVES if preset in each.bodies]
         numbers = {"preset": values_of(BODIES[preset], ranges)}
         if "--presets" not in arguments:
-            numbers["fit"] = fit(preset, [each for each in sets if preset in each.built])
+            numbers["fit"] = fit(preset, [each for each in sets if preset in each.fitted])
         print(f"\n{preset}: shear moduli in Pa, thicknesses in m, loss in s")
         print(f"{'':30}{'range':>22}", *(f"{name:>12}" for name in numbers))
         for name, each in ranges.items():

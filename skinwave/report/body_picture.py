@@ -83,7 +83,7 @@ class MeshedBody:
         return {name: REGIONS[k % len(REGIONS)] for k, name in enumerate(names)}
 
     def on_top(self, places: Floats) -> Floats:
-        """Return the points (q, 3) of the upper surface at those places (p, 2) in mm on it."""
+        """Return points (q, 3) of the upper surface: places (p, 2) in mm beside it are left out."""
         top = on_triangles(self.points, split(self.top), 0.9999 * places)
         height = top(self.points[:, 2])
         return np.column_stack([places, height])[np.isfinite(height)]

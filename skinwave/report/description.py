@@ -39,7 +39,7 @@ def model_paragraphs(runs: Sequence[Run]) -> list[str]:
 
 
 def unresolved_lines(runs: Iterable[Run], most: int = 4) -> list[str]:
-    """Return a sentence about unresolved lines for each duration of a Tacton; it names a few."""
+    """Return a sentence for each duration of a Tacton that names `most` unresolved lines."""
     unresolved = {run.scene.tacton.duration: run.unresolved for run in runs if run.unresolved}
     return [
         f"A Tacton of {seconds:g} s is too short to resolve {plural(len(names), 'line')}: "

@@ -36,7 +36,7 @@ def expecting(progress: Progress, seconds: float | None) -> Iterator[None]:
 
 
 def announce(progress: Progress, phase: str, fraction: float = 0.0) -> None:
-    """Show a phase on a bar, but not as a line on a pipe: it may refuse the input, in one line."""
+    """Show a phase on a bar only: on a pipe, a refusal of the input is the only line."""
     if isinstance(progress, _Bar):
         progress(phase, fraction)
 

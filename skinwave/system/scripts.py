@@ -20,7 +20,7 @@ _NAME = re.compile(r"([\w$]+)(?:\s+as\s+([\w$]+))?")
 
 
 def digest(script: str) -> str:
-    """Return the source of a script in a content security policy: its digest."""
+    """Return the digest of a script as it is written in a content security policy."""
     return f"'sha256-{b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 

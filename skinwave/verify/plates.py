@@ -256,7 +256,7 @@ def _navier_exact(lengths: Sequence[float], material: fem.Material, m: int, n: i
 
 
 def _strip_bending(thin: float, aspect: float) -> tuple[float, float, float]:
-    """Return the mid-span deflection under a sine of 1 Pa: ours, Filon's and Kirchhoff's, m."""
+    """Return mid-span deflections in m under a sine of 1 Pa: of elements, Filon and Kirchhoff."""
     n = max(4, round(1 / thin / aspect / 2))
     cell = 0.5 / n
     mesh = meshes.extrude(np.linspace(0, 0.5, n + 1), [0, cell], [-thin, 0])

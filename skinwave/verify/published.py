@@ -1,8 +1,8 @@
 """Published values for comparison with models, from `published.toml`.
 
 `how` is the quality of a set: read in the source, quoted elsewhere, from the abstract only, or
-computed from the source's numbers. `built` names the presets that were fitted to a source or chosen
-by it; their agreement with it is no evidence.
+computed from the source's numbers. `fitted` names the presets that were fitted to a source or
+chosen by it; their agreement with it is no evidence.
 """
 
 import tomllib
@@ -55,7 +55,7 @@ class Published:
     source: str
     how: str
     bodies: Sequence[str]
-    built: tuple[str, ...] = ()
+    fitted: Sequence[str] = ()
     areas: tuple[float, ...] = ()
     remark: str = ""
     reading_error: float = 0.05
@@ -100,9 +100,8 @@ def _read_published(table: dict[str, Any]) -> Published:
         numbers = {"values": tuple(lengths[0]), "lows": tuple(lengths[1:].min(axis=0)),
                    "highs": tuple(lengths[1:].max(axis=0))}  # fmt: skip
     return Published(
-        quantity=quantity, frequencies=frequencies, bodies=tuple(table.pop("bodies")),
-        built=tuple(table.pop("fitted", ())),
-        areas=tuple(1e-4 * area for area in table.pop("areas_cm2", ())), **numbers, **table,
+        quantity=quantity, frequencies=frequencies, **numbers,
+        areas=tuple(1e-4 * area for area in table.pop("areas_cm2", ())), **table,
     )  # fmt: skip
 
 

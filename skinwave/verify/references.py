@@ -20,8 +20,10 @@ def gaussian_at_rest(r: Array, *, width: float, shear_modulus: float, poisson: f
 def gaussian_on_bonded_layer(
     r: Array, *, width: float, shear_modulus: float, poisson: float, depth: float
 ) -> Array:
-    """Return the same for a layer bonded to a rigid base: that kernel times
-    (2 c sinh 2u - 4u) / (2 c cosh 2u + 4 u^2 + 1 + c^2), u = k depth, c = 3 - 4 nu.
+    """Return the deflection of a layer on a rigid base under the same pressure.
+
+    Its kernel is that of the half-space times (2 c sinh 2u - 4u) / (2 c cosh 2u + 4 u^2 + 1 + c^2)
+    with u = k depth and c = 3 - 4 nu.
     """
     k = np.linspace(1e-9, 8, 4001) / width
     u, c = k * depth, 3 - 4 * poisson
@@ -32,8 +34,9 @@ def gaussian_on_bonded_layer(
 
 
 def half_space_kernel(k: Array, w: float, *, density: float, mu: complex, poisson: float) -> Array:
-    """Return the deflection per pressure of wavenumber k, with a complex modulus: -b_p k_s^2 / (mu
-    R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s.
+    """Return the deflection per pressure of wavenumber k, with a complex modulus mu.
+
+    It is -b_p k_s^2 / (mu R) with R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s.
     """
     ks2 = density * w**2 / mu
     bp, bs = np.sqrt(k**2 - ks2 * (1 - 2 * poisson) / (2 - 2 * poisson)), np.sqrt(k**2 - ks2 + 0j)
@@ -50,15 +53,13 @@ def plate_kernel(k: Array, w: float, *, stiffness: complex, mass: float, air: fl
 
 
 def gaussian_response(
-    kernel: Callable[[Array], Array],
-    r: Array,
-    *,
-    width: float,
-    circle: float = 0.0,
+    kernel: Callable[[Array], Array], r: Array, *, width: float, circle: float = 0.0,
     harmonic: int = 0,
-) -> Array:
-    """Return Hankel's integral of a kernel for a Gaussian pressure of 1 Pa. For a push on a circle
-    of radius R, harmonic n at radius r is int s^2 exp(-k^2 s^2 / 2) G(k) J_n(k R) J_n(k r) k dk.
+) -> Array:  # fmt: skip
+    """Return Hankel's integral of a kernel G for a Gaussian pressure of 1 Pa.
+
+    For a push on a circle of radius R, harmonic n at radius r is
+    int s^2 exp(-k^2 s^2 / 2) G(k) J_n(k R) J_n(k r) k dk.
     """
     k = np.geomspace(1e-6, 8, 25_001) / width  # equal to 200_001 points to 1e-14
     common = width**2 * np.exp(-((k * width) ** 2) / 2) * kernel(k) * jv(harmonic, k * circle) * k
@@ -151,8 +152,9 @@ def layered_column(
 def lamb_pulse(
     t: Array, r: float, *, mu: float, shear_speed: float, delay: float, width: float
 ) -> Array:
-    """Return the vertical surface motion at r under a point force exp(-(t - delay)^2 / 2 width^2) N
-    for nu = 1/4: Mooney's step response, convolved with the derivative of the force.
+    """Return the vertical motion of a surface at r under a point force, for nu = 1/4.
+
+    Mooney's step response is convolved with the derivative of exp(-(t - delay)^2 / 2 width^2) N.
     """
     s, g = np.sqrt(3), np.sqrt(3 + np.sqrt(3)) / 2
     x, weight = np.polynomial.legendre.leggauss(400)

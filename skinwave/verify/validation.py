@@ -1,20 +1,18 @@
 """Comparison of models with published measurements: rows, verdict, figures and page."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from simple_model.numbers import EN_DASH, interval, significant
-from skinwave.report.figures import REPORT, png
+from skinwave.report.figures import REPORT, legend, png, with_style
 from skinwave.system.document import Details, Part, Picture, Report, Section, contents
 from skinwave.system.effort import Progress, silent
 from skinwave.system.table import Column, Table
@@ -56,9 +54,9 @@ class Compared:
     ours: float
 
     @property
-    def is_built(self) -> bool:
+    def is_fitted(self) -> bool:
         """Whether the body was fitted to this source, so that agreement is no evidence."""
-        return self.body in self.published.built
+        return self.body in self.published.fitted
 
     @property
     def frequency(self) -> float:
@@ -148,7 +146,7 @@ def _predicted(
 
 
 def compare_finger(frequencies: Sequence[float], lengths: Iterable[float]) -> list[Compared]:
-    """Return rows of lengths (f,) in m along a finger and of the people of SkinSource."""
+    """Return rows that compare lengths (f,) in m along a finger with the people of SkinSource."""
     lows, highs = zip(*(SKINSOURCE.between(SKINSOURCE.frequencies.index(f)) for f in frequencies),
                       strict=True)  # fmt: skip
     own = replace(SKINSOURCE, frequencies=tuple(frequencies), values=(nan,) * len(lows), lows=lows,
@@ -159,7 +157,7 @@ def compare_finger(frequencies: Sequence[float], lengths: Iterable[float]) -> li
 def verdict(rows: Sequence[Compared]) -> list[str]:
     """Return sentences that sum up the comparisons."""
     single = [row for row in rows if not row.published.name.startswith(ALL)]
-    own = [row for row in single if not row.is_built]
+    own = [row for row in single if not row.is_fitted]
     within, low, high, without = _counts(own)
     sentences = [
         f"{within} of {len(own)} independent comparisons agree within the published spread or "
@@ -188,8 +186,8 @@ def verdict(rows: Sequence[Compared]) -> list[str]:
 
 
 def _by_quantity(own: Sequence[Compared]) -> list[list[Any]]:
-    """Return a row for each quantity: number of independent values, those within, those below and
-    above with their median factors, and the largest factor between sources at one frequency.
+    """Return a row for each quantity: numbers of independent values, of those within, below and
+    above with median factors, and the largest factor between sources at one frequency.
     """
     rows = []
     for quantity in QUANTITIES:
@@ -204,10 +202,10 @@ def _by_quantity(own: Sequence[Compared]) -> list[list[Any]]:
 
 
 def report(curves: Mapping[str, Curves], rows: Sequence[Compared], largest: float = 10.0) -> Report:
-    """Return the page, with its figures and validation.csv; factors are drawn up to a largest."""
+    """Return the page with its figures and validation.csv; factors are drawn up to `largest`."""
     sources = {row.published.name: row.published for row in rows}
     first, *others = verdict(rows)
-    own = [row for row in rows if not row.is_built and not row.published.name.startswith(ALL)]
+    own = [row for row in rows if not row.is_fitted and not row.published.name.startswith(ALL)]
     factors = (
         "Each point is a preset at a frequency. Grey: within 5 %, the accuracy of reading a curve. "
         "Hollow: the preset was fitted to that source. Filled: it predicts the source. "
@@ -227,14 +225,12 @@ def report(curves: Mapping[str, Curves], rows: Sequence[Compared], largest: floa
         "as fitted. All other values are predictions. A factor is the model's value over the "
         "published value, or over the nearer end of its spread."
     )
-    height, draw_factors = 0.24 * len(sources) + 1.2, partial(_factors, rows=rows, largest=largest)
     parts: list[Part] = [
-        _picture("factors", draw_factors, (10.5, height), factors),
+        Picture(png(_factors(rows, largest)), factors, "factors"),
         " ".join([others[0], *others[1 + len(QUANTITIES):]]), scope,
         Details("Every set and preset", [_summary(rows)]),
         Details("Every value", [_table(rows)]),
-        Section("Speed and decay of waves",
-                [_picture("waves", partial(_waves, curves=curves), (11.5, 5.6), waves)]),
+        Section("Speed and decay of waves", [Picture(png(_waves(curves)), waves, "waves")]),
         Details("Sources", [Table(
             ["set", "site", "conditions", "source", "quality", "contradictions and assumptions"],
             [(s.name, s.site, s.conditions, s.source, s.how, s.remark) for s in sources.values()],
@@ -268,7 +264,7 @@ def _summary(rows: Sequence[Compared]) -> Table:
     columns = ("set", "preset", "fitted or predicted", "values", *get_args(Outcome),
                "median factor of a miss")  # fmt: skip
     return Table(columns, (
-        (name, body, "fitted" if group[0].is_built else "predicted", len(group), *_counts(group),
+        (name, body, "fitted" if group[0].is_fitted else "predicted", len(group), *_counts(group),
          _median(group)) for (name, body), group in groups.items()
     ))  # fmt: skip
 
@@ -281,7 +277,7 @@ def _table(rows: Sequence[Compared]) -> Table:
         low, high = each.between(row.k) if each.lows else (nan, nan)
         numbers = (x / each.quantity.size for x in (each.values[row.k], low, high, row.ours))
         return [each.name, each.site, each.quantity.name, each.quantity.unit, row.frequency,
-                row.body, *numbers, row.factor, row.outcome, row.is_built, each.how,
+                row.body, *numbers, row.factor, row.outcome, row.is_fitted, each.how,
                 each.source]  # fmt: skip
 
     return Table(
@@ -293,31 +289,25 @@ def _table(rows: Sequence[Compared]) -> Table:
     )  # fmt: skip
 
 
-def _picture(
-    name: str, draw: Callable[[Figure], None], size: tuple[float, float], caption: str
-) -> Picture:
-    with mpl.rc_context(REPORT.rc):
-        figure = Figure(figsize=REPORT.size(*size), layout="constrained")
-        draw(figure)
-    return Picture(png(figure), caption, name)
-
-
 def _style(name: str) -> dict[str, Any]:
     """Return the colour and line of a preset: half-spaces solid, layers dashed."""
     return {"color": COLOURS[name], "ls": "-" if BODIES[name].depth == inf else "--"}
 
 
-def _factors(figure: Figure, rows: Sequence[Compared], largest: float) -> None:
+@with_style
+def _factors(rows: Sequence[Compared], largest: float) -> Figure:
     """Draw the factors, a row of points for each set."""
-    ax, names = figure.subplots(), list(dict.fromkeys(row.published.name for row in rows))
-    error = Published.reading_error
+    names, error = list(dict.fromkeys(row.published.name for row in rows)), Published.reading_error
+    size = REPORT.size(10.5, 0.24 * len(names) + 1.2)
+    figure = Figure(figsize=size, layout="constrained")
+    ax = figure.subplots()
     ax.axvspan(1 - error, 1 + error, color=COLOURS["range"], lw=0)
     for row in (row for row in rows if row.outcome != "no wave"):
         offset, colour = (list(COLOURS).index(row.body) - 3) / 9, COLOURS[row.body]
         factor = np.clip(row.factor, 1 / largest, largest)
         ax.plot(
             factor, names.index(row.published.name) + offset, "o", ms=4, mew=1, color=colour,
-            mfc="none" if row.is_built else None,
+            mfc="none" if row.is_fitted else None,
         )  # fmt: skip
     ax.set(
         xscale="log", xlim=(0.9 / largest, largest / 0.9), ylim=(len(names) - 0.5, -0.5),
@@ -328,28 +318,31 @@ def _factors(figure: Figure, rows: Sequence[Compared], largest: float) -> None:
     ax.minorticks_off()
     ax.set_yticks(range(len(names)), names)
     ax.grid(alpha=0.25)
-    marks = [Line2D([], [], color=colour, marker="o", ls="", ms=4, label=name)
-             for name, colour in COLOURS.items() if name != "range"]  # fmt: skip
-    figure.legend(handles=marks, loc="outside upper right", ncols=7, fontsize=8, frameon=False)
+    marks = {name: {"color": colour, "marker": "o", "ls": "", "ms": 4}
+             for name, colour in COLOURS.items() if name != "range"}  # fmt: skip
+    legend(figure, marks, 7, loc="outside upper right", fontsize=8)
+    return figure
 
 
-def _waves(figure: Figure, curves: Mapping[str, Curves]) -> None:
+@with_style
+def _waves(curves: Mapping[str, Curves]) -> Figure:
     """Draw phase speed and 1/e length over frequency: sources as points, presets as lines."""
+    figure = Figure(figsize=REPORT.size(11.5, 5.6), layout="constrained")
     for ax, quantity in zip(figure.subplots(1, 2), (SPEED, LENGTH), strict=True):
         _sources(ax, quantity)
         for name, c in curves.items():
             shown = c.frequencies >= 10
             ends = 1 + np.flatnonzero(np.diff(c.mode[shown]))  # where another mode leads
             values = (c.speed if quantity is SPEED else c.length) / quantity.size
-            parts = (np.split(x[shown], ends) for x in (c.frequencies, values))
-            for f, y in zip(*parts, strict=True):
-                ax.plot(f, y, lw=1.3, **_style(name))
+            f, y = (np.insert(x[shown], ends, nan) for x in (c.frequencies, values))
+            ax.plot(f, y, lw=1.3, **_style(name))
         ax.set(xlim=(-15, 720), xlabel="frequency, Hz", ylabel=f"{quantity.name}, {quantity.unit}")
         ax.set(**{"ylim": (0, 20)} if quantity is SPEED else {"yscale": "log", "ylim": (1, 300)})
         ax.grid(alpha=0.25)
         ax.legend(fontsize=7, frameon=False, loc="upper right")
-    handles = [Line2D([], [], label=name, **_style(name)) for name in curves]
-    figure.legend(handles=handles, loc="outside upper center", ncols=6, fontsize=8, frameon=False)
+    entries = {name: _style(name) for name in curves}
+    legend(figure, entries, 6, loc="outside upper center", fontsize=8)
+    return figure
 
 
 def _sources(ax: Axes, quantity: Quantity) -> None:

@@ -47,8 +47,8 @@ def test_factor_is_relative_to_the_nearer_end_of_the_spread():
     rows = compare_set(SPREAD, "palm-layers", [1.0, 3.0, 8.0, nan, inf])
     assert [row.outcome for row in rows] == ["below", "within", "above", "no wave", "above"]
     assert [row.factor for row in rows[:3]] == [0.5, 1.0, 2.0]
-    assert not rows[0].is_built
-    assert compare_set(SPREAD, "palm", [1.0])[0].is_built
+    assert not rows[0].is_fitted
+    assert compare_set(SPREAD, "palm", [1.0])[0].is_fitted
 
 
 def test_values_without_spread_agree_within_the_reading_error():
@@ -110,12 +110,12 @@ def test_each_published_set_has_a_row_for_each_body(curves):
     rows = validation.compare_sets(WAVES, curves)
     for each in WAVES:
         assert each.source
-        assert set(each.built) <= set(BODIES)
+        assert set(each.fitted) <= set(BODIES)
         assert len(each.values) == len(each.frequencies)
         own = [row for row in rows if row.published.name == each.name]
         assert len(own) == len(each.bodies) * len(each.frequencies)
-    built = {(row.published.name, row.body) for row in rows if row.is_built}
-    assert ("Zhang: speed", "forearm") in built
+    fitted = {(row.published.name, row.body) for row in rows if row.is_fitted}
+    assert ("Zhang: speed", "forearm") in fitted
 
 
 def test_best_focus_speed_of_a_half_space_is_near_its_surface_wave():
@@ -168,7 +168,7 @@ def test_contacts_are_compared_for_each_area_and_body(monkeypatch):
     assert by_set["Lundström: thenar, 3.1 cm²"].factor == pytest.approx(2.0)
     assert by_set["Lundström: fingertip, 0.28 cm²"].factor == pytest.approx(0.8)
     assert by_set["Dalecki: threshold, 1.8 cm²"].published.values == pytest.approx([0.4e-3])
-    assert not any(row.is_built for row in rows)
+    assert not any(row.is_fitted for row in rows)
 
 
 def test_finger_is_compared_at_its_own_frequencies():
