@@ -24,12 +24,9 @@ def colour(number: int) -> str:
 
 @with_style
 def dispersion_figure(
-    curves: DispersionCurves,
-    lines: Mapping[str, float],
-    focus_speed: float,
-    at: float,
+    curves: DispersionCurves, lines: Mapping[str, float], focus_speed: float, at: float,
     style: Style = REPORT,
-) -> Figure:
+) -> Figure:  # fmt: skip
     """Draw phase speed, 1/e length and group speed over frequency, and mode shapes at `at` Hz.
 
     `lines` are frequencies in Hz by name, the strongest first. `focus_speed` is in m/s, 0 for a

@@ -44,12 +44,9 @@ class MeasuredPlaces:
 
 @with_style
 def surfaces_figure(
-    scene: Scene,
-    surfaces: Mapping[str, SurfaceField],
-    style: Style = REPORT,
-    *,
+    scene: Scene, surfaces: Mapping[str, SurfaceField], style: Style = REPORT, *,
     measured: MeasuredPlaces | None = None,
-) -> Figure:
+) -> Figure:  # fmt: skip
     """Draw maps of RMS vibration and the path of the focus.
 
     `surfaces` are maps by column, or one map by its title. If there is a point kernel, all maps

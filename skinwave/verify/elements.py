@@ -14,7 +14,7 @@ from meshes import TetMesh
 from meshes.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from skinwave.typing import Floats
 from skinwave.verify.case import Check, Checks, below, case, order
-from skinwave.verify.setups import push, unit
+from skinwave.verify.setups import push, unit_solid
 
 PATCH = (
     "Irons and Razzaque (1972); Zienkiewicz and Taylor, The Finite Element Method, volume 1 "
@@ -39,7 +39,7 @@ def patch_quadratic() -> Checks:
     field = np.stack([x[:, 0] ** 2 + x[:, 1] * x[:, 2], x[:, 1] ** 2, x[:, 0] * x[:, 2]], axis=1)
     minus_force = np.array([(lam + mu) * 3 + 2 * mu, (lam + mu) * 2 + 2 * mu, 0.0])
     force = np.broadcast_to(-minus_force, x.shape)
-    M = fem.assemble(mesh, unit(0.3), fixed=np.zeros(x.shape, bool)).M
+    M = fem.assemble(mesh, unit_solid(0.3), fixed=np.zeros(x.shape, bool)).M
     u = _with_boundary_values(mesh, 0.3, field.ravel(), M @ force.ravel())
     yield below(RATIO, _largest_error(u, field), 1e-9)
 
@@ -48,7 +48,7 @@ def patch_quadratic() -> Checks:
 def slivers() -> Checks:
     """Slivers with a dihedral angle of half a degree."""
     mesh = cube_with_slivers()
-    ops, force = fem.assemble(mesh, unit(0.3), fixed="bottom"), push(mesh)
+    ops, force = fem.assemble(mesh, unit_solid(0.3), fixed="bottom"), push(mesh)
     f = force[ops.free]
     residual = f - ops.K @ fem.static(ops, force)[ops.free]
     yield _linear_field(mesh, 0.3, 1e-8)
@@ -114,7 +114,7 @@ def manufactured() -> Checks:
         (0.4999, (3, 5, 9), ("divergence-free", "dilating")),
     )
     for nu, cells, names in convergence:
-        problems = [fields[name](unit(nu).first_lame) for name in names]
+        problems = [fields[name](unit_solid(nu).first_lame) for name in names]
         errors = np.array([_errors(n, nu, problems) for n in cells])  # (meshes, fields, norms)
         for k, name in enumerate(names):
             for j, (norm, ceiling) in enumerate(ceilings):
@@ -163,7 +163,7 @@ def _solver(
 ) -> Callable[[Floats, Floats], Floats]:
     """Factorise once; return a function of a field, prescribed where `fixed`, and a force."""
     is_fixed = fixed_dofs(mesh, fixed)
-    K = fem.assemble(mesh, unit(poisson), fixed=np.zeros(mesh.points.shape, bool)).K
+    K = fem.assemble(mesh, unit_solid(poisson), fixed=np.zeros(mesh.points.shape, bool)).K
     inner = np.flatnonzero(~is_fixed)
     factor = fem.factorise(K[inner][:, inner])
 
@@ -185,7 +185,7 @@ def _errors(n: int, nu: float, problems: Iterable[Manufactured]) -> list[tuple[f
     They are relative to the field, and divided by the ratio of its stress to its gradient. This
     ratio reaches thousands for dilating fields near Poisson's ratio 1/2. The shear modulus is 1.
     """
-    first_lame = unit(nu).first_lame
+    first_lame = unit_solid(nu).first_lame
     mesh = meshes.extrude(*[np.linspace(0, 0.5, n + 1)] * 3)
     solver = cache(lambda fixed: _solver(mesh, nu, dict(fixed)))
     barycentric, weights = tetrahedron_rule(5)

@@ -29,7 +29,7 @@ from skinwave.verify.setups import (
     nearest,
     push,
     read,
-    unit,
+    unit_solid,
 )
 
 # Lengths in m and material of a plate with known natural frequencies.
@@ -262,6 +262,6 @@ def _strip_bending(thin: float, aspect: float) -> tuple[float, float, float]:
     mesh = meshes.extrude(np.linspace(0, 0.5, n + 1), [0, cell], [-thin, 0])
     fixed = {"left": "z", "right": "x", "front": "y", "back": "y"}
     force = push(mesh, lambda x: np.sin(np.pi * x[:, 0]))
-    u = fem.static(fem.assemble(mesh, unit(0.3), fixed=fixed), force)
+    u = fem.static(fem.assemble(mesh, unit_solid(0.3), fixed=fixed), force)
     exact = references.strip_under_sine(np.pi, thickness=thin, shear_modulus=1, poisson=0.3)
     return float(read(mesh, u, 0.5, cell / 2)[0]), exact, 6 * (1 - 0.3) / np.pi**4 / thin**3

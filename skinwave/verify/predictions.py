@@ -160,7 +160,7 @@ def peak(x: Array, y: Array) -> float:
 
 
 def along_finger(
-    file: Path, report: Progress, frequencies: Sequence[float], up: str = "-x", h: float = 6.5e-3
+    file: Path, progress: Progress, frequencies: Sequence[float], up: str = "-x", h: float = 6.5e-3
 ) -> Floats:
     """Return 1/e lengths (f,) in m on the palmar side of the longest finger of a hand.
 
@@ -169,7 +169,7 @@ def along_finger(
     """
     if not file.is_file():
         raise ValueError(f"--hand {file} does not exist; give the mesh file of a hand")
-    report("mesh the hand", 0.0)
+    progress("mesh the hand", 0.0)
     body = Body(kind="mesh", file=str(file), up=up)
     made = build(body, h)
     # The tip is the point farthest from the middle; the wrist is on the side with most points.
@@ -179,7 +179,7 @@ def along_finger(
     inwards = -tip / np.linalg.norm(tip)
     places = np.arange(0.020, 0.171, 0.010)  # m from the tip
     distances = places[np.linalg.norm(tip) + 0.04 > places]
-    report("assemble", 0.1)
+    progress("assemble", 0.1)
     matrices, (P, points) = operators(made), surface_load(made)
     focus_distance = 0.010  # m from the tip
     place = points - [*(tip + focus_distance * inwards), 0.0]
@@ -187,7 +187,7 @@ def along_finger(
     S = surface_motion(body, made, tip + distances[:, None] * inwards)
     amplitudes = []
     for k, f in enumerate(frequencies):
-        report(f"solve {f:g} Hz", 0.2 + 0.8 * k / len(frequencies))
+        progress(f"solve {f:g} Hz", 0.2 + 0.8 * k / len(frequencies))
         amplitudes.append(np.abs(S @ fem.harmonic(matrices, load, [f])[0]))
     slopes = np.polyfit(distances, np.log(amplitudes).T, 1)[0]
     return -1 / slopes

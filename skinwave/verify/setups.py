@@ -32,7 +32,7 @@ SOURCES = {  # of several cases
 }
 
 
-def unit(poisson: float) -> fem.Material:
+def unit_solid(poisson: float) -> fem.Material:
     """Return a material of density 1 and shear modulus 1."""
     return fem.Material(density=1, shear_modulus=1, poisson=poisson)
 

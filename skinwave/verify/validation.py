@@ -92,29 +92,29 @@ def compare_set(published: Published, body: str, ours: Iterable[float]) -> list[
 
 
 def validate(
-    report: Progress, *, hand: Path | None = None, samples: Samples = USUAL
+    progress: Progress, *, hand: Path | None = None, samples: Samples = USUAL
 ) -> tuple[Mapping[str, Curves], list[Compared]]:
     """Return the leading wave of each body, and rows of all published sets.
 
     With the file of a `hand`, rows include the decay along its finger, by finite elements.
     """
     f = (200.0, 300.0, 400.0)
-    of_hand = compare_finger(f, predictions.along_finger(hand, report, f)) if hand else []
-    report("waves", 0.02)
+    of_hand = compare_finger(f, predictions.along_finger(hand, progress, f)) if hand else []
+    progress("waves", 0.02)
     curves = {name: predictions.leading_wave(body, samples.frequencies)
               for name, body in BODIES.items()}  # fmt: skip
     sets = (*WAVES, all_sources(SPEED), all_sources(LENGTH), *CONTACTS, OPTIMUM)
-    return curves, compare_sets(sets, curves, report, samples) + of_hand
+    return curves, compare_sets(sets, curves, progress, samples) + of_hand
 
 
 def compare_sets(
-    sets: Sequence[Published], curves: Mapping[str, Curves], report: Progress = silent,
+    sets: Sequence[Published], curves: Mapping[str, Curves], progress: Progress = silent,
     samples: Samples = USUAL,
 ) -> list[Compared]:  # fmt: skip
     """Return rows of published sets for their bodies, some with several contacts or paths."""
     rows = []
     for k, each in enumerate(sets):
-        report(each.quantity.name, 0.1 + 0.9 * k / len(sets))
+        progress(each.quantity.name, 0.1 + 0.9 * k / len(sets))
         for name in each.bodies:
             for under, ours in _predicted(each, name, curves, samples).items():
                 rows += compare_set(replace(each, name=each.name + under), name, ours)

@@ -29,7 +29,7 @@ from skinwave.verify.setups import (
     push,
     quarter_space,
     read,
-    unit,
+    unit_solid,
 )
 
 
@@ -64,7 +64,7 @@ def lamb() -> Checks:
     """Lamb's problem: a pulse of force on a half-space, nu = 0.25."""
     mesh = _sector(2.3, 0.14)
     fixed = {"front": "y", "back": "x", "bottom": "xyz"}
-    ops = fem.assemble(mesh, unit(0.25), fixed=fixed, absorbing="right")
+    ops = fem.assemble(mesh, unit_solid(0.25), fixed=fixed, absorbing="right")
     delay, width = 0.8, 0.2
     force = push(mesh, gaussian(0.012))
     force /= 4 * np.abs(force[2::3].sum())
@@ -92,7 +92,7 @@ def rayleigh() -> Checks:
     mesh = meshes.extrude(np.linspace(0, 0.5, 11), [0, 0.05], -down[::-1])
     top = np.unique(mesh.facets["top"])
     for nu in (0.0, 0.25, 0.45, 0.4999):
-        material = unit(nu)
+        material = unit_solid(nu)
         exact, what = references.rayleigh_ratio(nu), f"c_R / c_s, nu = {nu:g}"
         yield relative(f"material's formula: {what}", material.rayleigh_speed, exact, 1e-9)
         ops = fem.assemble(mesh, material, fixed={**SLIDING, "bottom": "xyz"})
@@ -180,7 +180,7 @@ def _strip_modes(k: float) -> Array:
     """Return angular frequencies of half a wavelength of a plate between sliding ends."""
     x = np.linspace(0, np.pi / k, max(8, int(np.ceil(2 * np.pi / k))) + 1)
     mesh = meshes.extrude(x, [0, 0.25], np.linspace(-1, 0, 5))
-    return 2 * np.pi * frequencies(mesh, unit(0.3), SLIDING, 12)
+    return 2 * np.pi * frequencies(mesh, unit_solid(0.3), SLIDING, 12)
 
 
 def _sector(length: float, h: float) -> TetMesh:
@@ -204,7 +204,7 @@ def _reflected_in_plane(k: float, waves: Array) -> Array:
     sideways = -1j * along * np.sin(k * x[inner])[:, None] * wave
     downwards = into * np.cos(k * x[inner])[:, None] * wave
     amplitudes = []
-    ops = fem.assemble(mesh, unit(0.25), fixed=SLIDING, absorbing="bottom")
+    ops = fem.assemble(mesh, unit_solid(0.25), fixed=SLIDING, absorbing="bottom")
     pressure = push(mesh, lambda x: np.cos(k * x[:, 0]))
     sine = push(mesh, lambda x: np.sin(k * x[:, 0]))
     traction = np.roll(sine.reshape(-1, 3), 1, axis=1).ravel()  # along x

@@ -5,6 +5,7 @@ from markupsafe import Markup
 
 from simple_model import Effort
 from simple_model.numbers import decibel, interval, significant, with_error
+from skinwave.report.column_labels import axis_label
 from skinwave.system.document import Details, Picture, Report, Section
 from skinwave.system.table import Column, Table
 from skinwave.system.templates import typeset
@@ -27,6 +28,14 @@ def test_levels_errors_and_ranges():
     assert with_error(1.23456, np.nan) == "1.23"
     assert interval(5, 25.2) == "5.0\u201325"
     assert interval(-5, 25) == "-5.0 to 25"
+
+
+def test_axis_label_has_a_unit_and_no_part_of_it_in_words():
+    labels = {
+        "body.material.viscosity_pa_s": "material.viscosity, Pa s", "mesh_seconds": "mesh, s",
+        "seconds": "seconds, s", "2f_d_kernel_um": "$2f_{d}$ of the point kernel, µm",
+    }  # fmt: skip
+    assert {name: axis_label(name) for name in labels} == labels
 
 
 def test_a_table_is_csv_json_and_html():
