@@ -21,7 +21,7 @@ from skinwave.bodies.build import build, operators
 from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.system.effort import Progress
 from skinwave.typing import Array, Complex, Floats, Ints
-from skinwave.verify.published import SPEED, Quantity
+from skinwave.verify.published import SPEED, Observable
 
 # Half-spaces of one material, and layers on bone.
 BODIES: Mapping[str, Body] = {
@@ -55,7 +55,7 @@ class Curves:
     speed: Floats
     length: Floats
 
-    def at(self, quantity: Quantity, frequencies: ArrayLike) -> Floats:
+    def at(self, quantity: Observable, frequencies: ArrayLike) -> Floats:
         """Interpolate speeds or 1/e lengths (n,); nan out of range and without a wave."""
         f = np.asarray(frequencies)
         values = self.speed if quantity is SPEED else self.length

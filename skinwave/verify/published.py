@@ -18,20 +18,20 @@ ALL = "All sources"  # start of the names of `all_sources`
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """A published quantity: its name, its unit on pages, and the size of that unit in SI."""
+class Observable:
+    """What was measured: its name, its unit on pages, and the size of that unit in SI."""
 
     name: str
     unit: str
     size: float = 1.0
 
 
-SPEED = Quantity("phase speed", "m/s")
-LENGTH = Quantity("1/e length", "mm", 1e-3)
-EXPONENT = Quantity("decay exponent", "")
-FOCUS_SPEED = Quantity("speed of the focus", "m/s")
-FORCE = Quantity("force at the detection threshold", "mN", 1e-3)
-SOFTEST = Quantity("frequency of least impedance", "Hz")
+SPEED = Observable("phase speed", "m/s")
+LENGTH = Observable("1/e length", "mm", 1e-3)
+EXPONENT = Observable("decay exponent", "")
+FOCUS_SPEED = Observable("speed of the focus", "m/s")
+FORCE = Observable("force at the detection threshold", "mN", 1e-3)
+SOFTEST = Observable("frequency of least impedance", "Hz")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class Published:
 
     name: str
     site: str
-    quantity: Quantity
+    quantity: Observable
     frequencies: tuple[float, ...]
     values: tuple[float, ...]
     lows: tuple[float, ...] = ()
@@ -63,11 +63,6 @@ class Published:
     def between(self, k: int) -> tuple[float, float]:
         """Return the lowest and highest value, in SI, at frequency number k."""
         return (self.lows[k], self.highs[k]) if self.lows else (self.values[k], self.values[k])
-
-    def at(self, frequency: float) -> tuple[float, float] | None:
-        """Return both at a frequency in Hz, or None if the source does not have it."""
-        equal = np.flatnonzero(np.isclose(self.frequencies, frequency))
-        return self.between(int(equal[0])) if len(equal) else None
 
 
 def rayleigh_wave(modulus: float, viscosity: float, frequency: float) -> tuple[float, float]:
@@ -113,11 +108,14 @@ CONTACTS = tuple(map(_read_published, _FILE["contact"]))
 NOT_COMPARED = tuple(tuple(each.values()) for each in _FILE["not_compared"])
 
 
-def all_sources(quantity: Quantity) -> Published:
+def all_sources(quantity: Observable) -> Published:
     """Return the range over all sources, at frequencies that two or more sources have."""
     sets = [each for each in WAVES if each.quantity is quantity]
-    ranges = {f: [x for each in sets if (x := each.at(f))] for f in np.arange(100.0, 701, 100)}
-    shared = {float(f): pairs for f, pairs in ranges.items() if len(pairs) > 1}
+    shared = {}
+    for f in range(100, 701, 100):
+        having = [each for each in sets if f in each.frequencies]
+        if len(having) > 1:
+            shared[float(f)] = [each.between(each.frequencies.index(f)) for each in having]
     return Published(
         name=f"{ALL}: {quantity.name}", quantity=quantity, frequencies=tuple(shared),
         values=(np.nan,) * len(shared), **_FILE["all_sources"],

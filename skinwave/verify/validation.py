@@ -30,8 +30,8 @@ from skinwave.verify.published import (
     SOFTEST,
     SPEED,
     WAVES,
+    Observable,
     Published,
-    Quantity,
     all_sources,
 )
 
@@ -345,7 +345,7 @@ def _waves(curves: Mapping[str, Curves]) -> Figure:
     return figure
 
 
-def _sources(ax: Axes, quantity: Quantity) -> None:
+def _sources(ax: Axes, quantity: Observable) -> None:
     """Draw published values with their spread, or their range, and the range of all sources."""
     size, whole = quantity.size, all_sources(quantity)
     low, high = (np.array(x) / size for x in (whole.lows, whole.highs))
