@@ -17,7 +17,7 @@ from skinwave.report.styles import Style
 PALE = 0.35  # opacity of evanescent modes
 
 
-def colour(number: int) -> str:
+def mode_colour(number: int) -> str:
     """Return the colour of the mode with this index."""
     return SERIES[number % len(SERIES)]
 
@@ -57,7 +57,7 @@ def dispersion_figure(
     axes[-1].set_xlabel("frequency, Hz")
     ink = mpl.rcParams["text.color"]
     entries: dict[str, dict[str, Any]] = {
-        mode.name: {"color": colour(n), "lw": 2.2} for n, mode in enumerate(curves.modes)
+        mode.name: {"color": mode_colour(n), "lw": 2.2} for n, mode in enumerate(curves.modes)
     } | {"evanescent": {"color": ink, "lw": 1, "alpha": PALE}, "lines of the load": LINE_STYLE}
     if focus_speed:
         entries[f"focus, {focus_speed:g} m/s"] = {"color": ink, "lw": 1.2, "ls": "--"}
@@ -80,15 +80,15 @@ def _draw_curves(axes: Sequence[Axes], curves: DispersionCurves, focus_speed: fl
             length = 1e3 / np.abs(wavenumber.imag)
             drawn.append((fine, np.where(wave, np.abs(1 / slowness), np.nan)))
         for ax, y in zip(axes, (speed, length), strict=False):
-            ax.plot(fine, y, color=colour(n), lw=1, alpha=PALE)
-            ax.plot(fine, np.where(wave, y, np.nan), color=colour(n), lw=2.2)
+            ax.plot(fine, y, color=mode_colour(n), lw=1, alpha=PALE)
+            ax.plot(fine, np.where(wave, y, np.nan), color=mode_colour(n), lw=2.2)
         if wave.any():
             speeds.append(float(np.median(speed[wave])))
             groups.append(float(np.nanmedian(drawn[-1][1])))
             longest = max(longest, float(np.nanmax(length[wave])))
     top = 1.8 * max(groups)
     for n, (fine, group) in enumerate(drawn):
-        axes[2].plot(fine, np.where(group < top, group, np.nan), color=colour(n), lw=2.2)
+        axes[2].plot(fine, np.where(group < top, group, np.nan), color=mode_colour(n), lw=2.2)
     if focus_speed:
         axes[0].axhline(focus_speed, color=mpl.rcParams["text.color"], lw=1.2, ls="--")
     axes[0].set_ylim(0, 1.8 * max(speeds) or 1.0)
@@ -108,7 +108,7 @@ def _shapes(figure: SubFigure, curves: DispersionCurves, at: float) -> None:
         turned = shape * np.exp(-1j * np.angle(shape[0, 1])) / np.abs(shape).max()
         pale = 1.0 if curves.modes[n].is_wave[number] else PALE
         for ax, part in zip(axes, (turned[:, 1].real, turned[:, 0].real), strict=True):
-            ax.plot(part, 1e3 * curves.depths, color=colour(n), lw=2, alpha=pale)
+            ax.plot(part, 1e3 * curves.depths, color=mode_colour(n), lw=2, alpha=pale)
     titles = (f"shapes at {curves.frequencies[number]:.0f} Hz: into the body", "along the surface")
     for ax, title in zip(axes, titles, strict=True):
         ax.set_title(title, fontsize="medium")

@@ -193,7 +193,7 @@ class Field:
         ValueError
             If the path has another suffix, or a file exists and `overwrite` is False.
         """
-        path, times = Path(path), self._some(frames).tolist()
+        path, times = Path(path), self._evenly_spaced(frames).tolist()
         if path.suffix != ".pvd":
             raise ValueError(f"'{path.name}' must end in .pvd")
         write_collection(path, self.grids(times), times, overwrite=overwrite)
@@ -219,7 +219,7 @@ class Field:
             If the film cannot be drawn or written, or the file exists and `overwrite` is False.
         """
         choose("camera", camera, CAMERAS)
-        shown = replace(self, times=self._some(frames))
+        shown = replace(self, times=self._evenly_spaced(frames))
         kind = self.scene.body.kind
         with TemporaryDirectory() as folder, progress_callback(progress) as report:
             target = Path(path or Path(folder, "film.gif"))
@@ -230,8 +230,8 @@ class Field:
                 film(aside, [view], style("report"), report, camera=camera)
             return Film(frames=len(view.times), suffix=target.suffix, data=target.read_bytes())
 
-    def _some(self, frames: int | None) -> Floats:
-        """Return some evenly chosen times, or all."""
+    def _evenly_spaced(self, frames: int | None) -> Floats:
+        """Return a number of evenly spaced times, or all."""
         if frames is not None and frames < 1:
             raise ValueError(f"frames = {frames} must be 1 or more")
         count = len(self.times)
