@@ -83,7 +83,7 @@ def main() -> None:
     with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for body in bodies:
-            data = data_of(bodies=[body], test=False)
+            data = data_of(bodies=[body], tests=0)
             file = Path(folder, f"{body}.html")
             file.write_text(page(data), encoding="utf-8")
             tab = browser.new_page(viewport={"width": 1280, "height": 800})

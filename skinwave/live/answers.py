@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -14,19 +14,13 @@ from skinwave.live.values import control_values, tacton_values
 from skinwave.scene.scene import BODIES, Scene
 from skinwave.system.effort import Progress, silent
 
-_T = TypeVar("_T")
-
-MOST_VALUES = 2_000_000  # of a measurement for a page
-
 
 def body_answer(content: bytes, progress: Progress = silent) -> dict[str, Any]:
     """Return the record of a changed body, from JSON {"toml", "changes", "name", "title"}."""
     try:
         request = json.loads(content)
         toml, changes, name, title = (request[key] for key in ("toml", "changes", "name", "title"))
-        is_valid = isinstance(changes, dict) and all(
-            isinstance(x, str) for x in (toml, name, title)
-        )
+        is_valid = {type(x) for x in (toml, name, title)} == {str} and isinstance(changes, dict)
     except (ValueError, KeyError, TypeError):
         is_valid = False
     if not is_valid:
@@ -46,8 +40,9 @@ def dispersion_answer(content: bytes) -> dict[str, Any]:
 
 
 def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict[str, Any]:
-    """Return the values of a scene file and the record of its body; of a pattern, which has no
-    body, the values of its Tacton.
+    """Return the values of a scene file and the record of its body.
+
+    Patterns have no body. For them, return the values of the Tacton only.
     """
     from skinwave.patterns import Options, read_pattern
 
@@ -66,18 +61,20 @@ def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict
     return {"values": values, "body": record_of(scene.body, pack, own, waves=False)}
 
 
-def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
-    """Return the curves of a measurement, averaged over its repetitions: name, quantity, remarks,
-    `places` [[x, y] in m or null], and `times` in s with `values` in SI units by place and time, or
-    `frequencies` in Hz with `amplitudes` by place and frequency.
+def measurement_answer(name: str, content: bytes, *, most: int = 2_000_000) -> dict[str, Any]:
+    """Return the curves of a measurement, averaged over its repetitions, as a dict for JSON.
+
+    It has name, quantity, remarks and `places` [[x, y] in m or null]. Its curves are `times` in s
+    and `values` in SI units by place and time, or `frequencies` in Hz and `amplitudes` by place and
+    frequency. Raises ValueError if there are more than `most` values.
     """
     from skinwave.measure.reading import read
 
     measured = _from_file(name or "the file", Path(name).suffix.lower(), content, read)
     mean = measured.values.mean(axis=0)
-    if mean.size > MOST_VALUES:
+    if mean.size > most:
         raise ValueError(
-            f"{name} has {mean.size:,} values, more than {MOST_VALUES:,}. Use skinwave compare."
+            f"{name} has {mean.size:,} values, more than {most:,}. Use skinwave compare."
         )
     places = [[*place] if np.isfinite(place).all() else None for place in measured.places.tolist()]
     curves = {
@@ -91,8 +88,8 @@ def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
     return curves | {"times": times.tolist(), "values": mean.real.T.tolist()}
 
 
-def _from_file(name: str, suffix: str, content: bytes, read: Callable[[Path], _T]) -> _T:
-    """Return what a reader of files makes of a content; its errors name the file `name`."""
+def _from_file(name: str, suffix: str, content: bytes, read: Callable[[Path], Any]) -> Any:
+    """Return what `read` returns for a file with a content. Its errors name the file `name`."""
     with TemporaryDirectory() as folder:
         file = Path(folder, f"sent{suffix}")
         file.write_bytes(content)

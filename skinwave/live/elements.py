@@ -8,6 +8,8 @@ acts through the same fields O_p that give the motion. Per area of the grid, the
 is proportional to the cosine of the slope: its square (`skinwave.scene.load`), over a larger area.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -17,34 +19,34 @@ from scipy import sparse
 import fem
 from fem.harmonic import LineSolver
 from fem.load_and_probe import on_surface
-from simple_model import MovingPressure, Tacton
 from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build, build, operators
 from skinwave.live.sheets import SIDE, STEP, grid_line
 from skinwave.models.laws import relaxing
 from skinwave.models.meshed import surface_load, surface_motion
-from skinwave.scene.scene import Body
+from skinwave.scene.scene import STILL, Body
 from skinwave.system.arrays import pack, quantise
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
-LOWEST = 0.15  # m: lowest height of the focus whose spot the elements resolve
-# m: radius of the area of training spots, and their spacing. Wider spacing leaves out parts of
-# the narrowest spot, at any number of dimensions.
-REACH, SPACING = 0.031, 0.0042
-FREQUENCIES = (20.0, 85.0, 155.0, 230.0, 315.0, 415.0, 540.0)  # Hz
-MOST = 700  # dimensions of the basis
-ERROR = 0.25  # relative, of components up to `BAND` and within 20 dB of the strongest
-BAND = 300.0  # Hz
-WARNING = (
-    f"The error is {100 * ERROR:g} % for components up to {BAND:g} Hz and within 20 dB of the "
-    "strongest one. It may be larger at higher frequencies, marked \u2248, and for weaker ones."
-)
-AVERAGED = 2e-3  # m: standard deviation of the average of the motion around a place of the grid
-NEGLIGIBLE = 1e-4  # relative RMS motion that the basis may miss
+
+@dataclass(frozen=True, kw_only=True)
+class Training:
+    """Training loads of the reduced basis, its size, and the error of its pack."""
+
+    lowest: float = 0.15  # m: lowest height of the focus whose spot the elements resolve
+    reach: float = 0.031  # m: radius of the area of spots
+    spacing: float = 0.0042  # m between spots. Wider spacing leaves out parts of the narrowest one
+    frequencies: tuple[float, ...] = (20.0, 85.0, 155.0, 230.0, 315.0, 415.0, 540.0)  # Hz
+    negligible: float = 1e-4  # relative RMS motion that the basis may miss
+    most: int = 700  # dimensions of the basis
+    error: float = 0.25  # relative, of components up to `band` and within 20 dB of the strongest
+    band: float = 300.0  # Hz
 
 
-def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str, Any]:
+def element_pack(
+    body: Body, h: float, progress: Progress = silent, training: Training = Training()
+) -> dict[str, Any]:
     """Return the pack of a finite-element body with elements of `h` in m, as a dict for JSON."""
     progress("mesh", 0.0)
     body = relaxing(body, FIT_TOLERANCE)
@@ -52,44 +54,48 @@ def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str,
     progress("assemble", 0.0)
     ops = operators(made)
     P, points = surface_load(made)
-    pressure = MovingPressure(tacton=Tacton(), height=LOWEST)
-    forces = P @ pressure.spot(points, training_knots(body)).T
-    basis = training_basis(ops, forces, partial(progress, "solve for focal spots"))
+    pressure = replace(STILL, height=training.lowest)
+    forces = P @ pressure.spot(points, training_knots(body, training)).T
+    basis = training_basis(ops, forces, training, partial(progress, "solve for focal spots"))
     progress("reduce", 0.0)
     poles, turn = reduced_poles(ops, basis)
     places, inside, cosines, heights = surface_grid(body, made)
     read = surface_reading(body, made, places[inside]) @ basis
     fields = (turn.T @ read.T).astype(np.complex64)
     return {
-        "kind": "poles", "step": STEP, "side": SIDE, "lowest_height_mm": 1e3 * LOWEST,
+        "kind": "poles", "step": STEP, "side": SIDE,
+        "lowest_height_mm": 1e3 * training.lowest, "reach_mm": 1e3 * training.reach,
         "poles": pack(poles), "fields": quantise(fields, bits=12),
         "cosines": quantise(cosines[None]),
         "inside": "".join("01"[int(each)] for each in inside),
-        "heights": quantise(1e3 * heights[None]), "reach_mm": 1e3 * REACH,
-        "error": ERROR, "band_hz": BAND, "warnings": [WARNING],
+        "heights": quantise(1e3 * heights[None]),
+        "error": training.error, "band_hz": training.band,
+        "warnings": [
+            f"The error is {100 * training.error:g} % for components up to {training.band:g} Hz "
+            "and within 20 dB of the strongest one. It may be larger at higher frequencies, marked "
+            "\u2248, and for weaker ones."
+        ],
     }  # fmt: skip
 
 
-def training_knots(body: Body) -> Floats:
+def training_knots(body: Body, training: Training) -> Floats:
     """Return places (j, 2) in m of focal spots over the whole area, on a triangular grid."""
-    rows = int(2 * REACH / (SPACING * 0.75**0.5)) + 1
-    half = np.array([body.width, body.height]) / 2 if body.of_kind.is_bounded else np.full(2, REACH)
-    grid = [
-        (SPACING * (column + 0.5 * (row % 2)), SPACING * 0.75**0.5 * row)
-        for row in range(-rows, rows + 1)
-        for column in range(-rows, rows + 1)
-    ]
-    knots = np.array(grid)
-    inside = (np.hypot(*knots.T) <= REACH) & (np.abs(knots) <= half).all(axis=1)
-    return np.asarray(knots[inside])
+    reach, height = training.reach, 0.75**0.5  # of a triangle of side 1
+    most = int(2 * reach / (training.spacing * height)) + 1
+    column, row = np.meshgrid(*2 * [np.arange(-most, most + 1)])
+    knots = training.spacing * np.stack([column + row % 2 / 2, height * row], -1).reshape(-1, 2)
+    half = np.array([body.width, body.height]) / 2 if body.of_kind.is_bounded else reach
+    return knots[(np.hypot(*knots.T) <= reach) & (np.abs(knots) <= half).all(axis=1)]
 
 
-def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> np.ndarray:
-    """Return a basis (3 n, r) of the steady motion under loads (3 n, j) at all `FREQUENCIES`."""
+def training_basis(
+    ops: fem.Operators, forces: Floats, training: Training, report: Callable[[float], None]
+) -> np.ndarray:
+    """Return a basis (3 n, r) of the steady motion under loads (3 n, j) at all frequencies."""
     solve = LineSolver(ops, accuracy=1e-5)  # below what single precision keeps of the basis
     snapshots: list[np.ndarray] = []
-    for k, frequency in enumerate(FREQUENCIES):
-        report(k / len(FREQUENCIES))
+    for k, frequency in enumerate(training.frequencies):
+        report(k / len(training.frequencies))
         part = solve(frequency, forces)[ops.free]
         motion = np.hstack([part.real.astype(np.float32), part.imag.astype(np.float32)])
         snapshots.append(motion / float(np.linalg.norm(motion)))
@@ -97,7 +103,7 @@ def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> np.ndarra
     squares, turn = np.linalg.eigh((motions.T @ motions).astype(np.float64))
     squares, turn = squares[::-1], turn[:, ::-1]
     missed = np.sqrt(np.maximum(np.cumsum(squares[::-1])[::-1], 0.0) / squares.sum())
-    size = min(MOST, int((missed > NEGLIGIBLE).sum()))
+    size = min(training.most, int((missed > training.negligible).sum()))
     basis = np.zeros((len(forces), size), np.float32)
     basis[ops.free] = motions @ (turn[:, :size] / np.sqrt(squares[:size])).astype(np.float32)
     return basis
@@ -125,20 +131,22 @@ def reduced_poles(ops: fem.Operators, basis: np.ndarray) -> tuple[fem.Complex, f
     return poles.values, outputs * np.sqrt(factor)
 
 
-def surface_reading(body: Body, made: Build, places: Floats) -> sparse.csr_array:
+def surface_reading(
+    body: Body, made: Build, places: Floats, *, width: float = 2e-3
+) -> sparse.csr_array:
     """Return the operator (p, 3 n) of the motion around places (p, 2) in m of the grid.
 
-    Slopes of a mesh jump at the edges of its elements. Sums over the grid, which replace integrals
-    over the surface, would contain them; so the motion is averaged over finer places with the
-    kernel whose transform is exp(-x) (1 + x + x^2 / 2), x = (k AVERAGED)^2 / 2, which changes waves
-    longer than 10 mm by less than 5 %.
+    Slopes of a mesh jump at the edges of its elements, and sums over the grid, which replace
+    integrals over the surface, would contain the jumps. The motion is therefore averaged over finer
+    places. With x = (k width)^2 / 2 the transform of the averaging kernel is
+    exp(-x) (1 + x + x^2 / 2), which changes waves longer than 10 mm by less than 5 %.
     """
-    within = np.arange(-8, 9) * AVERAGED / 2
+    within = np.arange(-8, 9) * width / 2
     offsets = np.stack(np.meshgrid(within, within), -1).reshape(-1, 2)
     fine, index = np.unique(
         np.round((places[:, None] + offsets).reshape(-1, 2), 9), axis=0, return_inverse=True
     )
-    q = (offsets**2).sum(axis=1) / AVERAGED**2
+    q = (offsets**2).sum(axis=1) / width**2
     kernel = np.exp(-q / 2) * (1 - (q - 2) / 2 + (q**2 - 8 * q + 8) / 8)
     rows = np.repeat(np.arange(len(places)), len(offsets))
     values = np.tile(kernel, len(places))

@@ -22,11 +22,11 @@ from skinwave.system.formats import MEASUREMENTS, suffixes
 from skinwave.system.scripts import bundle, digest, json_for_script
 from skinwave.system.templates import render
 
-TITLE = "skinwave: waves in skin and paper under mid-air ultrasound haptics"
-DEFAULT_BODIES = ("skin-slab", "paper-sheet", "palm")
 
-
-def page(data: Mapping[str, Any], title: str = TITLE) -> str:
+def page(
+    data: Mapping[str, Any],
+    title: str = "skinwave: waves in skin and paper under mid-air ultrasound haptics",
+) -> str:
     """Return the live page as HTML, with data from `data_of`."""
     static = resources.files("skinwave") / "static"
     script = "\n" + bundle(static, "page.js")
@@ -52,29 +52,27 @@ def data_of(
     scenes: Sequence[Scene] = (),
     progress: Progress = silent,
     *,
-    bodies: Sequence[str] = DEFAULT_BODIES,
+    bodies: Sequence[str] = ("skin-slab", "paper-sheet", "palm"),
     tests: int = 60,
 ) -> dict[str, Any]:
-    """Return the data of a page of scenes at their probes nearest to the path, or of preset bodies,
-    as a dict for JSON. The self-test has at least `tests` random Tactons. A body that fails is left
-    out, with its reason in "failures". Raises ValueError if all fail, or if no control of the page
-    can set a scene.
+    """Return the data of a page of scenes, or of preset bodies, as a dict for JSON.
+
+    The point of the page is the probe nearest to the path. The self-test has at least `tests`
+    random Tactons. A body that fails is left out, with its reason in "failures". Raises ValueError
+    if all fail, or if no control of the page can set a scene.
     """
-    scenes = [
-        replace(scene, probes=tuple(sorted(scene.probes, key=partial(_distance, scene))))
-        for scene in scenes
-    ]
+    scenes = [replace(scene, probes=(_nearest(scene),)) for scene in scenes]
     names = unique_names([scene.body for scene in scenes] or [BODIES[name] for name in bodies])
     own = [values.control_values(scene, names[scene.body]) for scene in scenes]
     records, tested, failures = [], [], dict[str, str]()
+
+    def on_body(prefix: str, phase: str, fraction: float) -> None:
+        progress(f"{prefix}{phase}", fraction)
+
     for body, name in names.items():
         prefix = f"{title_of(body)}: " if len(names) > 1 else ""
-
-        def on_body(phase: str, fraction: float, prefix: str = prefix) -> None:
-            progress(f"{prefix}{phase}", fraction)
-
         with or_failed(failures, title_of(body)):
-            pack = pack_of(body, on_body)
+            pack = pack_of(body, partial(on_body, prefix))
             records.append(record_of(body, pack, name))
             if count := -(-tests // len(names)):
                 lowest = pack["lowest_height_mm"] / 1e3
@@ -92,8 +90,10 @@ def data_of(
 
 
 def comparison_page(scenes: Iterable[Scene]) -> tuple[str, dict[str, str]]:
-    """Return the page of the scenes with quick packs that it can set, skin first, or "", and the
-    reasons of bodies that failed. Raises a ValueError if all fail.
+    """Return a page of those scenes that it can set and whose packs are quick, skin first.
+
+    It is "" if there are no such scenes. Also return the reasons of bodies that failed. Raises
+    ValueError if all fail.
     """
     quick = sorted(filter(_is_quick, scenes), key=lambda scene: not scene.body.is_skin)
     if not quick:
@@ -102,8 +102,10 @@ def comparison_page(scenes: Iterable[Scene]) -> tuple[str, dict[str, str]]:
     return page(data), {f"live page of {name}": why for name, why in data["failures"].items()}
 
 
-def _distance(scene: Scene, probe: tuple[float, float]) -> float:
-    return float(distance_from_path(scene, np.array(probe)))
+def _nearest(scene: Scene) -> tuple[float, float]:
+    """Return the probe of a scene that is nearest to its path."""
+    distances = distance_from_path(scene, np.array(scene.probes))
+    return scene.probes[int(distances.argmin())]
 
 
 def _is_quick(scene: Scene) -> bool:

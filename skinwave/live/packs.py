@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from meshes import cache
-from simple_model import MovingPressure, Tacton
 from skinwave.bodies.analytic import has_exact_waves, is_laterally_infinite
 from skinwave.live.elements import element_pack
 from skinwave.live.radial import radial_pack
 from skinwave.live.sheets import sheet_pack
 from skinwave.models.limits import takes
 from skinwave.models.plate_modes import MODES
-from skinwave.scene.scene import Body, Scene
+from skinwave.scene.scene import STILL, Body, Scene
 from skinwave.system.effort import Progress, silent, versions
 
 FORMAT = "live pack 6"  # of cached entries
@@ -41,14 +40,16 @@ def pack_method(body: Body) -> str:
 
 def resting_scene(body: Body) -> Scene:
     """Return a scene of a body under a focus that rests at the origin."""
-    return Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))
+    return Scene(pressure=STILL, body=body, probes=((0.0, 0.0),))
 
 
 def pack_of(body: Body, progress: Progress = silent) -> dict[str, Any]:
     """Return the pack of a body as a dict for JSON. Packs of finite-element bodies are cached."""
     method = pack_method(body)
-    if method != "poles":
-        return {"radial": radial_pack, "modal": sheet_pack}[method](body, progress)
+    if method == "radial":
+        return radial_pack(body, progress)
+    if method == "modal":
+        return sheet_pack(body, progress)
     content = hashlib.sha256(Path(body.file).read_bytes()).hexdigest() if body.file else ""
     size = body.of_kind.interactive_size
     key = cache.key(FORMAT, body, content, size, versions())

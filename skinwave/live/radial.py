@@ -8,6 +8,7 @@ and wide enough for the narrowest profile. The path of integration runs above th
 from the poles of waves, as in `simple_model.layers.wavenumber_integral`.
 """
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,39 +29,57 @@ from skinwave.system.arrays import pack, quantise
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
-LOWEST = 0.1  # m: lowest height of the focus
-ERROR = 2e-3  # relative, of lines above -40 dB: twice the largest error of 200 Tactons
-HIGHEST = 1200.0  # Hz: at higher frequencies skin moves by less than 0.1 % of its largest motion
-SPACING = 2.5  # Hz between frequencies: resolves motion that lasts up to 0.2 s
-MIDDLE, DAMPED = 300.0, 0.1  # Hz, and the loss factor with which motion there lasts 10 ms
-FURTHEST = 0.145  # m: diagonal of the area
-DISTANCES = np.linspace(0, FURTHEST, int(np.ceil(6 * FURTHEST / spot_width(LOWEST))))  # m
-BROADEST = 6.5  # over the width of a spot: its transform is negligible at larger wavenumbers
-ORDER = 16  # of Gauss and Legendre's rule on each panel
-FEWEST_NODES = 256  # of the wavenumber grid
-CHECKED = 16  # the grid is checked at every 16th frequency and distance
+
+@dataclass(frozen=True, kw_only=True)
+class RadialGrid:
+    """Limits and resolution of the pack of a laterally infinite body."""
+
+    lowest: float = 0.1  # m: lowest height of the focus
+    error: float = 2e-3  # relative, of lines above -40 dB: twice the largest of 200 Tactons
+    highest: float = 1200.0  # Hz: above, skin moves by less than 0.1 % of its largest motion
+    spacing: float = 2.5  # Hz between frequencies: resolves motion that lasts up to 0.2 s
+    furthest: float = 0.145  # m: diagonal of the area
+    per_width: int = 6  # distances in each width of the narrowest spot
+    fewest_nodes: int = 256  # of the wavenumber grid
+    checked: int = 16  # the wavenumber grid is checked at every 16th frequency and distance
+
+    @property
+    def width(self) -> float:
+        """Width in m of the narrowest spot."""
+        return float(spot_width(self.lowest))
+
+    @property
+    def distances(self) -> Floats:
+        """Distances (r,) in m from the middle of a spot."""
+        count = int(np.ceil(self.per_width * self.furthest / self.width))
+        return np.linspace(0, self.furthest, count)
 
 
-def radial_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
-    """Return the pack of a laterally infinite body: `frequencies` (f,) in Hz, complex `k` (k,) in
-    1/m and `weights` of the path of integration, and the compliance `G` (f, k) in m/Pa. Raises
-    ArithmeticError if no grid of wavenumbers is fine enough.
+def radial_pack(
+    body: Body, progress: Progress = silent, grid: RadialGrid = RadialGrid()
+) -> dict[str, Any]:
+    """Return the pack of a laterally infinite body as a dict for JSON.
+
+    It has the `frequencies` (f,) in Hz, the complex wavenumbers `k` (k,) in 1/m on the path of
+    integration, their `weights` (k,), and the compliance `G` (f, k) in m/Pa. Raises ArithmeticError
+    if no grid of wavenumbers is fine enough.
     """
     progress("wavenumber integral", 0.0)
-    response, frequencies = compliance(body), _frequencies(body)
-    n, some = FEWEST_NODES, frequencies[::CHECKED]
-    coarse = _tabulate(_path(response, some, n))
+    response, frequencies = compliance(body), _frequencies(body, grid)
+    n, some = grid.fewest_nodes, frequencies[:: grid.checked]
+    coarse = _tabulate(_path(response, some, n, grid), grid)
     while True:
         if n >= MOST_NODES:
             raise ArithmeticError(UNRESOLVED)
-        fine = _tabulate(_path(response, some, 2 * n))
+        fine = _tabulate(_path(response, some, 2 * n, grid), grid)
         if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
             break
         coarse, n = fine, 2 * n
-    path = _path(response, frequencies, n)
+    path = _path(response, frequencies, n, grid)
     return {
-        "kind": "radial", "error": ERROR, "lowest_height_mm": 1e3 * LOWEST,
-        "frequencies": frequencies.tolist(), "furthest": FURTHEST, "n_distances": len(DISTANCES),
+        "kind": "radial", "error": grid.error, "lowest_height_mm": 1e3 * grid.lowest,
+        "frequencies": frequencies.tolist(), "furthest": grid.furthest,
+        "n_distances": len(grid.distances),
         "k": pack(path.k[None]), "weights": pack(path.weights[None]),
         "G": quantise(path.G),
     }  # fmt: skip
@@ -74,30 +93,37 @@ class _Path(NamedTuple):
     G: fem.Complex
 
 
-def _frequencies(body: Body) -> Floats:
-    """Frequencies (f,) in Hz, half as dense above `MIDDLE` if loss damps the motion there."""
-    w = 2 * np.pi * MIDDLE
-    moduli = [solid.complex_modulus(w) for _, solid in body.strata]
-    damped = min(modulus.imag / modulus.real for modulus in moduli) > DAMPED
-    fine = np.arange(0.0, HIGHEST + SPACING, SPACING)
-    return fine[(fine <= MIDDLE) | (fine % (2 * SPACING) == 0)] if damped else fine
+def _frequencies(
+    body: Body, grid: RadialGrid, *, middle: float = 300.0, damped: float = 0.1
+) -> Floats:
+    """Frequencies (f,) in Hz. Above `middle` in Hz they are half as dense if the loss factor there
+    is above `damped`, because motion then lasts less than 10 ms.
+    """
+    moduli = [solid.complex_modulus(2 * np.pi * middle) for _, solid in body.strata]
+    is_damped = min(modulus.imag / modulus.real for modulus in moduli) > damped
+    fine = np.arange(0.0, grid.highest + grid.spacing, grid.spacing)
+    return fine[(fine <= middle) | (fine % (2 * grid.spacing) == 0)] if is_damped else fine
 
 
-def _tabulate(path: _Path) -> fem.Complex:
+def _tabulate(path: _Path, grid: RadialGrid) -> fem.Complex:
     """Response g (f, r) at some distances for the narrowest profile."""
-    k, width = path.k, spot_width(LOWEST)
+    k, width, some = path.k, grid.width, grid.distances[:: grid.checked]
     shares = width**2 * np.exp(-((k * width) ** 2) / 2) * k * path.weights
-    return np.asarray(path.G @ (shares[:, None] * jv(0, k[:, None] * DISTANCES[::CHECKED])))
+    return np.asarray(path.G @ (shares[:, None] * jv(0, k[:, None] * some)))
 
 
-def _path(response: Compliance, frequencies: Floats, n: int) -> _Path:
+def _path(
+    response: Compliance, frequencies: Floats, n: int, grid: RadialGrid, *, order: int = 16
+) -> _Path:
+    """Return n nodes, in panels with Gauss and Legendre's rule of an order."""
     w = 2 * np.pi * frequencies.astype(np.complex128)
-    lift = min(1.5 / FURTHEST, response.clearance(w))  # J0 grows by e^1.5 at most
+    lift = min(1.5 / grid.furthest, response.clearance(w))  # J0 grows by e^1.5 at most
     if not lift > 0:
         raise ArithmeticError(UNRESOLVED)
-    nodes, weights = np.polynomial.legendre.leggauss(ORDER)
-    # Panels grow with k, because waves of low frequencies have their poles near k = 0.
-    edges = BROADEST / spot_width(LOWEST) * np.linspace(0, 1, n // ORDER + 1) ** 2
+    nodes, weights = np.polynomial.legendre.leggauss(order)
+    # The transform of a spot is negligible above 6.5 / width. Panels grow with k, because waves of
+    # low frequencies have their poles near k = 0.
+    edges = 6.5 / grid.width * np.linspace(0, 1, n // order + 1) ** 2
     half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
     along = (middle[:, None] + half[:, None] * nodes).ravel()
     ramp = np.tanh(along / lift)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from math import isclose, isfinite, pi
 from typing import Any
 
@@ -17,13 +18,7 @@ from skinwave.scene.scene import BODIES, Body, Layer, body_name, solid_of
 
 SECTIONS = ("body", "placement")  # of a scene file
 LOSS_AT = 200.0  # Hz
-SPREADS = (1.01, 1.5, 4.0, 100.0)  # factors around the ratio of loss factors
 SAME = 1e-5  # relative: a value this close to the present one changes nothing
-FREQUENCIES = np.linspace(10.0, 650.0, 33)  # Hz of dispersion curves
-MODES = 4
-SIDES = ("clamped", "absorbing", "free")
-SUPPORTS = ("clamped", "simply")
-MOUNTING = {"tension_x": "Tension along x", "tension_y": "Tension along y", "support": "Edges"}
 RANGES = {  # lowest, highest, step
     "thickness": (0.05, 40.0, 0.05), "modulus": (0.5, 100.0, 0.5), "loss": (0.01, 2.0, 0.01),
     "sheet_thickness": (0.02, 1.0, 0.005), "young": (0.1, 12.0, 0.1),
@@ -63,8 +58,10 @@ class Editable:
 def record_of(
     body: Body, pack: Mapping[str, Any], name: str = "", title: str = "", *, waves: bool = True
 ) -> dict[str, Any]:
-    """Return the record of a body as a dict for JSON, with its pack and, if `waves`, its dispersion
-    curves. Name and title are those of the body by default.
+    """Return the record of a body with its pack as a dict for JSON.
+
+    Name and title are those of the body by default. Without `waves` the record has no dispersion
+    curves.
     """
     kind, infinite = body.of_kind, pack_method(body) == "radial"
     extent = [500 * body.width, 500 * body.height] if kind.is_bounded and not infinite else None
@@ -99,8 +96,9 @@ def body_of(toml: str) -> Body:
 
 
 def with_changes(body: Body, changes: Mapping[str, Any]) -> Body:
-    """Return a body with changed values, by keys of its `editables`. Raises a ValueError if a key
-    is unknown or a value is out of range.
+    """Return a body with changed values, by keys of its `editables`.
+
+    Raises ValueError if a key is unknown or a value is out of range.
     """
     for key, value in changes.items():
         own = {each.key: each for each in editables(body)}
@@ -120,23 +118,40 @@ def with_changes(body: Body, changes: Mapping[str, Any]) -> Body:
 
 
 def editables(body: Body) -> list[Editable]:
-    """Return the values of a body that a page can change: layers from the surface downwards,
-    density of a single layer, mounting of a sheet, base and sides of a slab.
+    """Return the values of a body that a page can change.
+
+    These are layers from the surface downwards, the density of a single layer, the mounting of a
+    sheet, and base and sides of a slab.
     """
     if not body.of_kind.discretise:
         return []
     values = [each for number in range(len(body.layers) + 1) for each in _of_layer(body, number)]
     if not body.layers:
-        values.append(Editable(
-            key="density", label="Density", unit="kg/m\u00b3", range=RANGES["density"],
-            value=_five_digits(body.solid.density),
-            change=lambda value: replace(body, material=replace(body.solid, density=value)),
-        ))  # fmt: skip
+        values.append(_part(body, "material", body.solid, "density", "Density",
+                            unit="kg/m\u00b3", range=RANGES["density"]))  # fmt: skip
     if body.of_kind.is_plate and body.sides == "clamped":
-        values += [_of_mounting(body, *each) for each in MOUNTING.items()]
+        mounting = partial(_part, body, "mounting", body.mounting)
+        for axis in "xy":
+            label = f"Tension along {axis}"
+            values.append(mounting(f"tension_{axis}", label, unit="N/m", range=RANGES["tension"]))
+        values.append(mounting("support", "Edges", choices=("clamped", "simply")))
     if body.of_kind.is_layer and isfinite(body.depth):
-        values += [_support(body, name) for name in ("base", "sides")]
+        sides = ("clamped", "absorbing", "free")
+        values += [_part(body, "", body, name, name.capitalize(), choices=sides)
+                   for name in ("base", "sides")]  # fmt: skip
     return [each for each in values if isinstance(each.value, str | float)]
+
+
+def _part(body: Body, owner: str, record: Any, name: str, label: str, **more: Any) -> Editable:
+    """Return the field `name` of a record, which is the field `owner` of a body, or the body."""
+    value = getattr(record, name)
+
+    def change(new: Any) -> Body:
+        changed = replace(record, **{name: new})
+        return replace(body, **{owner: changed}) if owner else changed
+
+    shown = _five_digits(value) if isinstance(value, float) else value
+    return Editable(key=name, label=label, value=shown, change=change, **more)
 
 
 def _of_layer(body: Body, number: int) -> list[Editable]:
@@ -185,35 +200,23 @@ def _of_layer(body: Body, number: int) -> list[Editable]:
     ]  # fmt: skip
 
 
-def _of_mounting(body: Body, name: str, label: str) -> Editable:
-    return Editable(
-        key=name, label=label, value=getattr(body.mounting, name), range=RANGES["tension"],
-        unit="" if name == "support" else "N/m", choices=SUPPORTS if name == "support" else (),
-        change=lambda new: replace(body, mounting=replace(body.mounting, **{name: new})),
-    )  # fmt: skip
-
-
-def _support(body: Body, name: str) -> Editable:
-    return Editable(
-        key=name, label=name.capitalize(), value=getattr(body, name), choices=SIDES,
-        change=lambda new: replace(body, **{name: new}),
-    )  # fmt: skip
-
-
 def _loss_factor(solid: Material) -> float:
     mu = complex(solid.complex_modulus(2 * pi * LOSS_AT))
     return mu.imag / mu.real
 
 
 def _loss_scale(solid: Material, loss: float) -> float:
-    """Return the factor on the losses of a material that gives it a loss factor."""
+    """Return the factor on the losses of a material that gives it a loss factor.
+
+    It is looked for near the ratio of the loss factors, then farther away.
+    """
     from scipy.optimize import brentq  # slow to import
 
     def excess(factor: float) -> float:
         return _loss_factor(solid.scaled(loss=factor)) - loss
 
     own = _loss_factor(solid)
-    for spread in SPREADS if own > 0 else ():
+    for spread in (1.01, 1.5, 4.0, 100.0) if own > 0 else ():
         with suppress(ValueError):  # outside the material's law, or no change of sign
             return float(brentq(excess, loss / own / spread, loss / own * spread, rtol=SAME / 10))
     raise ValueError(
@@ -222,10 +225,12 @@ def _loss_scale(solid: Material, loss: float) -> float:
     )
 
 
-def dispersion_of(body: Body) -> dict[str, Any] | None:
-    """Return phase speeds in m/s of the propagating waves over frequency in Hz, or None."""
+def dispersion_of(
+    body: Body, *, highest: float = 650.0, count: int = 33, most: int = 4
+) -> dict[str, Any] | None:
+    """Return phase speeds in m/s of at most `most` waves over frequency in Hz, or None."""
     try:
-        curves = dispersion(body, FREQUENCIES, MODES)
+        curves = dispersion(body, np.linspace(10.0, highest, count), most)
     except (ValueError, ArithmeticError):
         return None
     speeds = [np.where(mode.is_wave, mode.phase_speed, np.nan).tolist() for mode in curves.modes]

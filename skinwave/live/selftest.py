@@ -1,17 +1,24 @@
 """The self-test of the page: random Tactons with their exact steady lines at a point."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fem.load_and_probe import on_surface
-from simple_model import SUPERPOSITIONS, MovingPressure, Tacton, Trajectory, even_phases
+from simple_model import (
+    SHAPES,
+    SUPERPOSITIONS,
+    MovingPressure,
+    Tacton,
+    Trajectory,
+    even_phases,
+)
 from simple_model.layers.flat_body import steady_lines
 from skinwave.bodies.analytic import compliance
-from skinwave.live.elements import BAND
+from skinwave.live.elements import Training
 from skinwave.live.packs import pack_method
-from skinwave.live.radial import LOWEST
 from skinwave.live.values import control_values
 from skinwave.models.meshed import mesh_body
 from skinwave.models.options import SolveOptions
@@ -23,44 +30,47 @@ from skinwave.scene.scene import STILL, Body, Scene
 from skinwave.system.effort import Clock, silent
 from skinwave.typing import Complex, Floats
 
-SEED = 15
-# Compared lines: smallest amplitude relative to the largest at the point, highest frequency in Hz,
-# and fewest of a Tacton. The pack of a body of elements is less accurate.
-SMALLEST, HIGHEST, FEWEST = 0.01, 1000.0, 3
-SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS, FEWEST_OF_ELEMENTS = 0.1, BAND, 1
-SHAPES = ("point", "line", "circle", "triangle", "square")
-DRIVES = ("pressure_squared", "force_corrected", "linear")
-# Places in m at which the exact model of a body of elements is prepared.
-PLACES = ((0.0, 0.0), (0.006, -0.002), (-0.011, 0.007), (0.004, 0.016), (0.02, -0.012))
-
-FARTHEST = float(np.abs(PLACES).max())
-WITHIN, SHARES = 0.3, (1.0, 0.5, 0.25, 0.1)  # of the side of a body; sizes to try on other bodies
-
 Lines = Callable[[Scene], tuple[Floats, Complex]]
 Waveform = Callable[[Scene], Floats]
 Places = tuple[tuple[float, float], ...]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """Which lines of a Tacton the self-test compares, and how many it must have."""
+
+    smallest: float = 0.01  # amplitude relative to the largest at the point
+    highest: float = 1000.0  # Hz
+    fewest: int = 3
+
+    def strong(self, f: Floats, sizes: Floats) -> np.ndarray:
+        """Whether each line (f,) at a frequency in Hz, with a size in m, is compared, (f,)."""
+        known = (f > 0) & (f <= Compared.highest)
+        largest = sizes[known].max(initial=0.0)
+        return (f > 0) & (f <= self.highest) & (sizes > self.smallest * largest)
+
+
+# The pack of a body of elements is less accurate.
+OF_ELEMENTS = Compared(smallest=0.1, highest=Training.band, fewest=1)
+
+
 def selftest(
-    body: Body, name: str, count: int, lowest: float, error: float
+    body: Body, name: str, count: int, lowest: float, error: float, *, seed: int = 15
 ) -> list[dict[str, Any]]:
-    """Return random Tactons on a body with their steady lines at a point, as records of the body's
-    name, the values, the lines [{f in Hz, re, im in m}] and the largest relative error.
+    """Return random Tactons on a body with their steady lines at a point, as records for JSON.
+
+    A record has the body's name, the values of the controls, the lines [{f in Hz, re, im in m}] and
+    the largest relative error.
     """
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(seed)
     records: list[dict[str, Any]] = []
     lines_of, _, places = exact(body)
-    smallest, highest, fewest = SMALLEST, HIGHEST, FEWEST
-    if places:
-        smallest, highest = SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS
-        fewest = FEWEST_OF_ELEMENTS
+    limits = OF_ELEMENTS if places else Compared()
     while len(records) < count:
         scene = random_scene(body, rng, lowest, places)
         f, amplitudes = lines_of(scene)
-        size = np.abs(amplitudes)
-        compared = (f > 0) & (f <= highest)
-        compared &= size > smallest * size[(f > 0) & (f <= HIGHEST)].max(initial=0.0)
-        if compared.sum() < fewest:  # such as a focus that neither moves nor is modulated
+        compared = limits.strong(f, np.abs(amplitudes))
+        if compared.sum() < limits.fewest:  # such as a focus that neither moves nor is modulated
             continue
         lines = zip(f[compared].tolist(), amplitudes[compared].tolist(), strict=True)
         records.append({
@@ -71,15 +81,16 @@ def selftest(
 
 
 def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
-    """Return a model of a body without its pack: two functions of a scene with one probe, for its
-    lines, frequencies (f,) in Hz and amplitudes (f,) in m, and for its motion (t,) from rest; and
-    the places (p, 2) in m where they are valid, () for any.
+    """Return a model of a body that does not use its pack: (lines, waveform, places).
+
+    `lines(scene)` returns frequencies (f,) in Hz and amplitudes (f,) in m at the only probe of a
+    scene, `waveform(scene)` its motion (t,) in m from rest. They are valid at `places` (p, 2) in m,
+    () for any place.
     """
     method = pack_method(body)
     if method != "poles":
         model = "flat-body" if method == "radial" else FROM_REST.name
-        lines_of = _lines_of_layers if method == "radial" else _lines_of_sheet
-        return lines_of, lambda scene: compute(scene, model).values[:, 0], ()
+        return _steady_lines, lambda scene: compute(scene, model).values[:, 0], ()
     size = SolveOptions(h=h or body.of_kind.interactive_size)
     places = _places_on(body)
     prepared = reduce_scene(Scene(pressure=STILL, body=body, probes=places), size)
@@ -95,32 +106,34 @@ def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
 
 
 def _places_on(body: Body) -> Places:
-    """Return `PLACES`, nearer to the origin on a body that does not reach as far."""
+    """Return places in m at which the exact model of a body of elements is prepared.
+
+    They are nearer to the origin on a small body: within 0.3 of its sides, or on its mesh.
+    """
+    places = np.array([(0, 0), (0.006, -0.002), (-0.011, 0.007), (0.004, 0.016), (0.02, -0.012)])
     if body.of_kind.is_bounded:
-        shares = [min(1.0, WITHIN * min(body.width, body.height) / FARTHEST)]
+        shares = [min(1.0, 0.3 * min(body.width, body.height) / np.abs(places).max())]
     else:
         mesh = mesh_body(body, body.of_kind.interactive_size, Clock(), silent).mesh
-        shares = [s for s in SHARES if on_surface(mesh, s * np.array(PLACES)).all()]
-    return tuple((shares[0] * x, shares[0] * y) for x, y in PLACES)
+        shares = [s for s in (1.0, 0.5, 0.25, 0.1) if on_surface(mesh, s * places).all()]
+    return tuple((x, y) for x, y in (shares[0] * places).tolist())
 
 
-def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
-    f, lines = steady_lines(
-        compliance(scene.body), scene.pressure, scene.probe_points, threshold=1e-4
-    )
+def _steady_lines(scene: Scene) -> tuple[Floats, Complex]:
+    """Return the lines of layers or a sheet at the only probe of a scene, as in `exact`."""
+    if pack_method(scene.body) == "modal":
+        f, lines = plate_lines(scene, scene.probe_points)
+    else:
+        response, places = compliance(scene.body), scene.probe_points
+        f, lines = steady_lines(response, scene.pressure, places, threshold=1e-4)
     return f, lines[:, 0]
 
 
-def _lines_of_sheet(scene: Scene) -> tuple[Floats, Complex]:
-    f, amplitudes = plate_lines(scene, scene.probe_points)
-    return f, amplitudes[:, 0]
+def random_scene(body: Body, rng: np.random.Generator, lowest: float, places: Places = ()) -> Scene:
+    """Return a scene with a random Tacton that the controls can set.
 
-
-def random_scene(
-    body: Body, rng: np.random.Generator, lowest: float = LOWEST, places: Places = ()
-) -> Scene:
-    """Return a scene with a random Tacton that the controls can set. The height of the focus is at
-    least `lowest` in m, and the probe is at one of the places, () for any.
+    The height of the focus is at least `lowest` in m. The probe is at one of the places, () for any
+    place.
     """
     bounded = body.of_kind.is_bounded
     sides = (body.width / 2, body.height / 2) if bounded else (float(np.abs(places).max()),)
@@ -139,7 +152,8 @@ def random_scene(
         trajectory=path, foci=even_phases(int(rng.integers(1, 4))),
     )  # fmt: skip
     height = float(rng.integers(round(200 * lowest), 60)) / 200
-    pressure = MovingPressure(tacton=tacton, drive=str(rng.choice(DRIVES)), height=height)
+    drive = str(rng.choice(["pressure_squared", "force_corrected", "linear"]))
+    pressure = MovingPressure(tacton=tacton, drive=drive, height=height)
     x, y = np.round(rng.uniform(-0.8 * half, 0.8 * half, 2), 4).tolist()
     if places:
         x, y = places[int(rng.integers(len(places)))]

@@ -15,7 +15,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import count
 from threading import Lock
-from typing import Any, TypeVar
+from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from skinwave.live.answers import body_answer, dispersion_answer, measurement_answer, scene_answer
@@ -26,22 +26,11 @@ from skinwave.system.plain_text import printable, say
 LARGEST_REQUEST = {  # bytes
     "body": 2**20, "dispersion": 2**20, "scene": 2**22, "measurement": 20_000_000,
 }  # fmt: skip
-TIMEOUT = 60.0  # s without data, after which a connection is closed
-LONGEST_LINE = 300  # characters of an error in the terminal
-OWN_HOST = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?")
-BASE = re.compile(r"/([\w.~%@:+-]+/)*")
-NO_TOKEN = (
-    "The token is missing or belongs to another run. Open the address that skinwave web printed, "
-    "with its ?token=..., in this browser."
-)
-WRONG_HOST = "Open this page as http://127.0.0.1 or http://localhost, or start it with --base-url."
 FAULT = "The server failed. Its terminal shows the error."
 HEADERS = {
     "Cache-Control": "no-store", "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY",
 }  # fmt: skip
-EXPECTED = (ValueError, ArithmeticError, MemoryError, RecursionError)
-_T = TypeVar("_T")
 
 
 class Superseded(Exception):
@@ -49,16 +38,17 @@ class Superseded(Exception):
 
 
 class Server(ThreadingHTTPServer):
-    """Server of a page on a port, 0 for any, which `show` sets. `base` is the path under which a
-    proxy shows the page; it begins and ends with "/". Raises ValueError if the path or the port
-    cannot be used.
+    """Server of a page, which `show` sets, on a port, 0 for any free one.
+
+    `base` is the path under which a proxy shows the page. It begins and ends with "/". Raises
+    ValueError if the path or the port cannot be used.
     """
 
     daemon_threads = True
     block_on_close = False
 
     def __init__(self, port: int = 0, base: str = "/", token: str = "") -> None:
-        if not BASE.fullmatch(base):
+        if not re.fullmatch(r"/([\w.~%@:+-]+/)*", base):
             raise ValueError(
                 f"base-url = {base} is not a path. Give a path such as /user/name/proxy/8123/."
             )
@@ -83,7 +73,7 @@ class Server(ThreadingHTTPServer):
         """Address that opens the page on this machine."""
         return f"http://127.0.0.1:{self.server_port}{self.base}?token={self.token}"
 
-    def compute(self, work: Callable[[Progress], _T]) -> _T:
+    def compute(self, work: Callable[[Progress], Any]) -> Any:
         """Return the result of `work(progress)`. The callback raises `Superseded` when newer work
         arrives. Only one call runs at a time.
         """
@@ -107,7 +97,7 @@ class Server(ThreadingHTTPServer):
 class _Handler(BaseHTTPRequestHandler):
     server: Server
     server_version, sys_version = "skinwave", ""
-    timeout = TIMEOUT
+    timeout = 60.0  # s without data, after which a connection is closed
 
     def log_message(self, *_: Any) -> None:
         """Print nothing for a request."""
@@ -141,24 +131,28 @@ class _Handler(BaseHTTPRequestHandler):
     def _refusal(self, token: str, *, known: bool) -> tuple[HTTPStatus, str] | None:
         """Status and reason of a refusal, or None. `known` says whether the address exists."""
         if not self._is_local():
-            return HTTPStatus.FORBIDDEN, WRONG_HOST
+            return HTTPStatus.FORBIDDEN, (
+                "Open this page as http://127.0.0.1 or http://localhost, or start it with "
+                "--base-url."
+            )
         if not secrets.compare_digest(token.encode("utf-8", "replace"), self.server.token.encode()):
-            return HTTPStatus.FORBIDDEN, NO_TOKEN
+            return HTTPStatus.FORBIDDEN, (
+                "The token is missing or belongs to another run. Open the address that skinwave "
+                "web printed, with its ?token=..., in this browser."
+            )
         return None if known else (HTTPStatus.NOT_FOUND, "There is nothing at this address.")
 
     def _answer(self, kind: str, content: bytes) -> None:
-        name = unquote(self.headers.get("X-Name", ""))
-        works: dict[str, Callable[[Progress], Any]] = {
-            "body": partial(body_answer, content), "scene": partial(scene_answer, name, content),
-        }  # fmt: skip
+        name, compute = unquote(self.headers.get("X-Name", "")), self.server.compute
+        works: dict[str, Callable[[], Any]] = {
+            "body": lambda: compute(partial(body_answer, content)),
+            "scene": lambda: compute(partial(scene_answer, name, content)),
+            "dispersion": lambda: dispersion_answer(content),
+            "measurement": lambda: measurement_answer(name, content),
+        }
         try:
-            if kind in works:
-                result = self.server.compute(works[kind])
-            elif kind == "dispersion":
-                result = dispersion_answer(content)
-            else:
-                result = measurement_answer(name, content)
-            return self._send(HTTPStatus.OK, _json(result), "application/json")
+            text = json.dumps(works[kind](), allow_nan=False, separators=(",", ":"))
+            return self._send(HTTPStatus.OK, text.encode(), "application/json")
         except ConnectionError:
             raise
         except Exception as error:
@@ -177,7 +171,7 @@ class _Handler(BaseHTTPRequestHandler):
         if self.server.base != "/":
             return True
         same = not origin or origin.partition("://")[2] == host
-        return OWN_HOST.fullmatch(host) is not None and same
+        return same and bool(re.fullmatch(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?", host))
 
     def _refuse(self, status: HTTPStatus, sentence: str) -> None:
         self._send(status, sentence.encode(), "text/plain")
@@ -192,20 +186,16 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _print_fault(error: BaseException | None) -> None:
-    """Print a fault of the server in one line on its terminal."""
-    text = printable(f"{type(error).__name__}: {error}"[:LONGEST_LINE], keep="")
+    """Print a fault of the server in one line, of at most 300 characters, on its terminal."""
+    text = printable(f"{type(error).__name__}: {error}"[:300], keep="")
     say(f"skinwave: a request failed: {text}", sys.stderr)
-
-
-def _json(value: Any) -> bytes:
-    return json.dumps(value, allow_nan=False, separators=(",", ":")).encode()
 
 
 def _error_answer(error: Exception) -> tuple[HTTPStatus, str]:
     """Status and sentence for an error. Faults of the server are printed on its terminal."""
     if isinstance(error, Superseded):
         return HTTPStatus.CONFLICT, "A newer request has replaced this one."
-    if isinstance(error, EXPECTED):
+    if isinstance(error, ValueError | ArithmeticError | MemoryError | RecursionError):
         words = " ".join(str(error).split())
         return HTTPStatus.BAD_REQUEST, words or "There is not enough memory. Use larger elements."
     _print_fault(error)

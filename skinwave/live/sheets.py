@@ -8,6 +8,7 @@ given on a square grid. The force of a focal spot on a mode is the field of the 
 the spot.
 """
 
+from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
@@ -33,15 +34,21 @@ from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
 STEP, SIDE = 3e-3, 37  # m between places of the grid of fields, and number of places along a side
-LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last value
-LOWEST = 0.1  # m: lowest height of the focus
-ERROR = 0.02  # relative, of lines above -40 dB; it is larger for several foci on a wide path
-SLOPES = 81  # places along a side, for gradients of modes
-TYPICAL, TOLERANCE = 140.0, 0.05  # Hz and relative error, for a warning about thick sheets
-BAND = 1300.0  # Hz: modes below are kept, modes above are combined
-COUPLED_BAND = 2600.0  # Hz: coupling by loss is included for modes below
-NEGLIGIBLE = 0.005  # of the largest combination of modes above the band
-SAMPLED = (0.0, 600.0, 1000.0)  # Hz at which these combinations are sampled
+
+
+@dataclass(frozen=True, kw_only=True)
+class SheetAccuracy:
+    """Limits and accuracy of the pack of a sheet."""
+
+    lowest: float = 0.1  # m: lowest height of the focus
+    error: float = 0.02  # relative, of lines above -40 dB; larger for several foci on a wide path
+    thick: float = 0.05  # relative error of the thin plate, above which the page warns
+    law_step: float = 2.5  # Hz between values of the modulus
+    highest: float = 1000.0  # Hz: last value of the modulus
+    band: float = 1300.0  # Hz: modes below are kept, modes above are combined
+    coupled_band: float = 2600.0  # Hz: coupling by loss is included for modes below
+    negligible: float = 0.005  # of the largest combination of modes above the band
+    sampled: tuple[float, ...] = (0.0, 600.0, 1000.0)  # Hz, of these combinations
 
 
 def grid_line() -> Floats:
@@ -49,7 +56,9 @@ def grid_line() -> Floats:
     return np.asarray(STEP * (np.arange(SIDE) - (SIDE - 1) / 2))
 
 
-def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
+def sheet_pack(
+    body: Body, progress: Progress = silent, accuracy: SheetAccuracy = SheetAccuracy()
+) -> dict[str, Any]:
     """Return the pack of a flat sheet with supports as a dict for JSON."""
     progress("modes of the sheet", 0.0)
     modes = modes_of(plate_of(body))
@@ -61,11 +70,12 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     fields = modes.on_grid(x, y).reshape(SIDE, SIDE, -1).transpose(2, 1, 0).reshape(-1, SIDE**2)
     fields = fields * inside
     progress("combinations of high modes", 0.5)
-    squared, bending, turn = combine_modes(modes, fields)
-    frequencies = np.arange(0.0, HIGHEST + LAW_STEP / 2, LAW_STEP)
+    squared, bending, turn = combine_modes(modes, fields, accuracy)
+    law_step = accuracy.law_step
+    frequencies = np.arange(0.0, accuracy.highest + law_step / 2, law_step)
     relative = relative_modulus(body, 2 * np.pi * frequencies) - 1
     bent, stretched = np.diagonal(bending), modes.plate.tension_x or modes.plate.tension_y
-    coupled = int(np.searchsorted(squared, (2 * np.pi * COUPLED_BAND) ** 2))
+    coupled = int(np.searchsorted(squared, (2 * np.pi * accuracy.coupled_band) ** 2))
     solid = relaxing(body, FIT_TOLERANCE).solid
     damping = modes.damping @ turn**2
     stiffness, times = relaxing_stiffness(squared - bent, bent, solid)
@@ -73,12 +83,13 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     free = free_vibration(stiffness, times)
     thin = thin_plate_part(_typical(body))
     return {
-        "kind": "modal", "error": hypot(ERROR, thin.error), "lowest_height_mm": 1e3 * LOWEST,
-        "warnings": [thin.warning(TOLERANCE)] if thin.error > TOLERANCE else [],
+        "kind": "modal", "error": hypot(accuracy.error, thin.error),
+        "lowest_height_mm": 1e3 * accuracy.lowest,
+        "warnings": [thin.warning(accuracy.thick)] if thin.error > accuracy.thick else [],
         "step": STEP, "side": SIDE,
         "squared": pack(squared), "diagonal": pack(bent.copy()), "damping": pack(damping),
         "between": quantise(bending[:coupled, :coupled]) if stretched else None,
-        "law": pack(relative.astype(np.complex128)), "law_step": LAW_STEP,
+        "law": pack(relative.astype(np.complex128)), "law_step": law_step,
         "V": quantise((turn.T @ fields)[:, inside]),
         "inside": "".join("01"[int(each)] for each in inside),
         "stretching": stretching_of(body, modes, turn),
@@ -87,17 +98,20 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def stretching_of(body: Body, modes: PlateModes, turn: Floats) -> dict[str, Any] | None:
-    """Return the `slopes` (r,) of combinations (m, r) of modes, the integrals of their squared
-    gradients in 1/kg, and the `tension` in N/m per integral of the squared gradient of the
-    deflection, for a sheet whose edges do not move inwards; None for others.
+def stretching_of(
+    body: Body, modes: PlateModes, turn: Floats, *, places: int = 81
+) -> dict[str, Any] | None:
+    """Return what makes the tension of a stretched sheet, or None if its edges can move inwards.
 
-    By Berger's approximation, stretching is the same everywhere (J Appl Mech 22:465, 1955).
+    `slopes` (r,) in 1/kg are the integrals of the squared gradients of combinations (m, r) of
+    modes, from `places` along each side. `tension` in N/m is that per integral of the squared
+    gradient of the deflection. By Berger's approximation, stretching is the same everywhere
+    (J Appl Mech 22:465, 1955).
     """
     if not takes(STRETCHED, _typical(body)):
         return None
-    x, y = (np.linspace(-side / 2, side / 2, SLOPES) for side in (body.width, body.height))
-    fields = (modes.on_grid(x, y) @ turn).reshape(SLOPES, SLOPES, -1)
+    x, y = (np.linspace(-side / 2, side / 2, places) for side in (body.width, body.height))
+    fields = (modes.on_grid(x, y) @ turn).reshape(places, places, -1)
     across, along = (np.asarray(np.gradient(fields, own, axis=k)) for k, own in enumerate((x, y)))
     slopes = (across**2 + along**2).mean(axis=(0, 1))
     area, plate = body.width * body.height, modes.plate
@@ -107,22 +121,25 @@ def stretching_of(body: Body, modes: PlateModes, turn: Floats) -> dict[str, Any]
 
 def _typical(body: Body) -> Scene:
     """Return a Tacton at the middle of a sheet."""
-    pressure = MovingPressure(tacton=Tacton(am_frequency=TYPICAL, duration=0.1))
+    pressure = MovingPressure(tacton=Tacton(am_frequency=140.0, duration=0.1))
     x, y = body.placement.offset
     return Scene(pressure=pressure, body=body, probes=((float(x), float(y)),))
 
 
-def combine_modes(modes: PlateModes, fields: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the modes below `BAND` and the combinations of higher modes that focal spots move:
-    squared frequencies (r,) in rad2/s2, ascending, the stiffness of bending (r, r) in 1/s2 between
-    them, and the orthonormal combinations (m, r) of the modes.
+def combine_modes(
+    modes: PlateModes, fields: Floats, accuracy: SheetAccuracy
+) -> tuple[Floats, Floats, Floats]:
+    """Return the modes below the band and the combinations of higher modes that focal spots move.
+
+    The result is the squared frequencies (r,) in rad2/s2, ascending, the stiffness of bending
+    (r, r) in 1/s2 between them, and the orthonormal combinations (m, r) of the modes.
     """
     squared = modes.squared
-    low = squared < (2 * np.pi * BAND) ** 2
-    forces = spot_forces(fields[~low], spot_width(LOWEST))
-    motions = [forces / (squared[~low] - (2 * np.pi * f) ** 2)[:, None] for f in SAMPLED]
+    low = squared < (2 * np.pi * accuracy.band) ** 2
+    forces = spot_forces(fields[~low], spot_width(accuracy.lowest))
+    motions = [forces / (squared[~low] - (2 * np.pi * f) ** 2)[:, None] for f in accuracy.sampled]
     squares, directions = np.linalg.eigh(sum(each @ each.T for each in motions))
-    kept = directions[:, squares > NEGLIGIBLE**2 * squares.max(initial=0.0)]
+    kept = directions[:, squares > accuracy.negligible**2 * squares.max(initial=0.0)]
     own, turned = np.linalg.eigh(kept.T @ (squared[~low][:, None] * kept))
     turn = np.zeros((len(squared), low.sum() + len(own)))
     turn[low, : low.sum()] = np.eye(low.sum())

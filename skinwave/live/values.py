@@ -15,10 +15,6 @@ from skinwave.scene.scene import Scene, check_load
 Values = dict[str, Any]
 
 RATIOS = {f"{w1:g}:{w2:g}": (w1, w2) for w1, w2 in SUPERPOSITIONS}
-PROFILES = ("gaussian", "main_lobe")
-QUANTITIES = ("displacement", "velocity", "acceleration")
-CORNERS = {2: "point", 3: "line", 4: "triangle", 5: "square", CORNERS_OF_CIRCLE + 1: "circle"}
-TOLERANCE = 1e-8  # m, and share of the period, by which a recording may differ from named shapes
 PLAIN = {"am2": 0, "ratio": "1:0", "envelope": 0, "foci": 1, "pulses": "", "phases": "",
          "paths": "", "polyline": "", "ramp": 0}  # fmt: skip
 
@@ -54,8 +50,10 @@ def tacton_title(tacton: Tacton) -> str:
 
 
 def control_values(scene: Scene, body: str) -> Values:
-    """Return the values of the controls for a scene at its first probe; `body` is the name of its
-    body on the page. Raises ValueError if the scene has something that no control sets.
+    """Return the values of the controls for a scene at its first probe.
+
+    `body` is the name of its body on the page. Raises ValueError if the scene has something that no
+    control sets.
     """
     check_load(scene, "the live page")
     tacton, path, pressure = scene.tacton, scene.tacton.trajectory, scene.pressure
@@ -65,9 +63,12 @@ def control_values(scene: Scene, body: str) -> Values:
         "a sampled signal": tacton.signal is not None,
         "this superposition": tacton.superposition not in RATIOS.values(),
         f"the drive law '{pressure.law}'": pressure.drive not in DRIVES,
-        f"the focus profile '{pressure.profile_name}'": pressure.profile not in PROFILES,
+        f"the focus profile '{pressure.profile_name}'": pressure.profile
+        not in ("gaussian", "main_lobe"),
         "a probe below the surface": not scene.reading.is_on_surface,
-        f"the quantity {scene.quantity}": scene.quantity not in QUANTITIES,
+        f"the quantity {scene.quantity}": (
+            scene.quantity not in ("displacement", "velocity", "acceleration")
+        ),
     }
     if missing := [feature for feature, is_used in beyond.items() if is_used]:
         raise ValueError(
@@ -126,8 +127,11 @@ def _path_text(path: Trajectory) -> str:
     return "/".join([path.shape, *(f"{value:.10g}" for value in numbers)])
 
 
-def _own_paths(tacton: Tacton) -> tuple[Trajectory, ...]:
-    """The named shapes that a recorded path joins, one for each focus; () if it joins no shapes."""
+def _own_paths(tacton: Tacton, *, tolerance: float = 1e-8) -> tuple[Trajectory, ...]:
+    """Return the named shapes that a recorded path joins, one for each focus; () if there are none.
+
+    The path may differ from the shapes by a tolerance in m, and by the same share of its period.
+    """
     path, n = tacton.trajectory, tacton.n_paths
     if path.shape != "recorded" or path.levels or path.hold or n != len(tacton.foci):
         return ()
@@ -137,15 +141,16 @@ def _own_paths(tacton: Tacton) -> tuple[Trajectory, ...]:
     except (KeyError, ValueError):  # another number of corners, or no shape
         return ()
     is_same = len(same.times) == len(path.times) and (
-        np.allclose(same.outline, path.outline, rtol=0, atol=TOLERANCE)
-        and np.allclose(same.times, path.times, rtol=0, atol=TOLERANCE * path.times[-1])
+        np.allclose(same.outline, path.outline, rtol=0, atol=tolerance)
+        and np.allclose(same.times, path.times, rtol=0, atol=tolerance * path.times[-1])
     )
     return paths if is_same else ()
 
 
 def _shape_of(corners: np.ndarray) -> Trajectory:
-    """The named shape with corners (k, 2) in m, the first of which is repeated at the end."""
-    shape = CORNERS[len(corners)]
+    """Return the shape with corners (k, 2) in m, the first of which is repeated at the end."""
+    sides = {1: "point", 2: "line", 3: "triangle", 4: "square", CORNERS_OF_CIRCLE: "circle"}
+    shape = sides[len(corners) - 1]
     x, y = corners[:-1].mean(axis=0)
     side = float(np.linalg.norm(corners[1] - corners[0]))
     sizes = {"point": 0.0, "circle": 2 * float(np.hypot(*(corners[0] - [x, y])))}

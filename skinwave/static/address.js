@@ -26,19 +26,10 @@ export function fromAddress(text, starts = STARTS) {
   return { values, refused };
 }
 
-/** History of values: `add` a step, `go(-1)` or `go(1)` to its neighbour, and whether it `has` one. */
-export function createHistory(values) {
-  let steps = [values], at = 0;
-  const has = (way) => at + way in steps;
-  return {
-    add(next) {
-      if (toAddress(next) === toAddress(steps[at])) return;
-      steps = [...steps.slice(0, at + 1), next];
-      at++;
-    },
-    go: (way) => (has(way) ? steps[at += way] : null),
-    has,
-  };
+/** History {steps, at} of values with one more step, unless the values are those of the present one. */
+export function withStep({ steps, at }, next) {
+  if (toAddress(next) === toAddress(steps[at])) return { steps, at };
+  return { steps: [...steps.slice(0, at + 1), next], at: at + 1 };
 }
 
 /** Values and view in this page's address: {values, refused, view}. `starts` are those of the page. */

@@ -27,10 +27,10 @@ export function surfaceMotion({ at }, map) {
 }
 
 /**
- * Surface of a body as far as it is on a map: points (3 n,) in mm, z upwards, triangles, and the place on
- * the map of each point `at` (n,).
+ * Surface of a body as far as it is on a map, flat by default: points (3 n,) in mm, z upwards, triangles, and
+ * the place on the map of each point `at` (n,).
  */
-function shapeOf({ grid, heights }) {
+export function shapeOf({ grid, heights }) {
   const index = new Int32Array(SIDE * SIDE).fill(-1), points = [], triangles = [], at = [];
   for (let k = 0; k < SIDE * SIDE; k++) {
     const x = MAP_LINE[k % SIDE], y = MAP_LINE[Math.floor(k / SIDE)];

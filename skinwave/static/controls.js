@@ -11,6 +11,15 @@ const WORDS = {
 };
 const PAUSE = 120; // ms without a move of a slider of the body, after which the body is requested
 
+/** Function that calls another one after some ms in which it was not called again. */
+export function afterPause(act, ms) {
+  let due = 0;
+  return (...given) => {
+    clearTimeout(due);
+    due = setTimeout(act, ms, ...given);
+  };
+}
+
 const options = (values, words, chosen) => values.map((value) => `<option value="${escaped(value)}"${
   value === chosen ? " selected" : ""}>${escaped(words(value))}</option>`).join("");
 
@@ -35,13 +44,13 @@ function bodyKeys(body, editable) {
 /**
  * Connect the controls inside an element.
  *
- * `change(key, value, settled)` receives each valid value; `refuse(key, sentence)` an error of typed text, or
- * "" once it is valid; `moving(on)` whether a slider is held; `edit(key, text)` a value of the body. Returns
- * functions that show values and bodies.
+ * `change(key, value, settled)` receives each valid value, `refuse(key, sentence)` an error of typed text,
+ * `hold(on)` whether a slider is held, `edit(key, text)` a value of the body. `current()` gives the values.
+ * Returns functions that show values and bodies.
  */
-export function buildControls(host, { bodies, editable, change, refuse, moving, edit }) {
+export function buildControls(host, { editable, current, change, refuse, hold, edit }) {
   const $ = (id) => host.querySelector(`#${id}`), all = (selector) => [...host.querySelectorAll(selector)];
-  let values = {}, editDue = 0;
+  const editSoon = afterPause(edit, PAUSE);
 
   for (const input of all("input[data-key][type=range]")) {
     const { low, high, step, unit } = NUMBERS[input.dataset.key], label = LABELS[input.dataset.key];
@@ -52,39 +61,37 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     select.innerHTML = options(CHOICES[select.dataset.key], (value) => WORDS[value] ?? value);
   }
   for (const part of all(editable ? "[data-file]" : "[data-served]")) part.remove();
-  showBodies(bodies);
 
   function take(key, text, settled) {
+    let value;
     try {
-      const value = check(key, text);
-      refuse(key, "");
-      values = { ...values, [key]: value };
-      change(key, value, settled);
+      value = check(key, text);
     } catch (error) {
       refuse(key, error.message);
+      return;
     }
+    change(key, value, settled);
   }
 
   host.addEventListener("input", ({ target }) => {
     const { key, field, body } = target.dataset;
-    if (key && target.type === "range") { moving(true); take(key, target.value, false); }
+    if (key && target.type === "range") { hold(true); take(key, target.value, false); }
     else if (field && !("whole" in target.dataset)) take(field, target.value, false);
     else if (body && target.type === "range") {
       target.nextElementSibling.value = target.value;
-      clearTimeout(editDue);
-      editDue = setTimeout(() => edit(body, target.value), PAUSE);
+      editSoon(body, target.value);
     }
   });
   host.addEventListener("change", ({ target }) => {
     const { key, field, body } = target.dataset;
-    if (key) { moving(false); take(key, target.value, true); }
+    if (key) { hold(false); take(key, target.value, true); }
     else if (field) take(field, target.value, true);
-    else if (body) { clearTimeout(editDue); edit(body, target.value); }
+    else if (body) editSoon(body, target.value);
   });
-  host.addEventListener("pointerup", ({ target }) => target.type === "range" && moving(false));
+  host.addEventListener("pointerup", ({ target }) => target.type === "range" && hold(false));
   host.addEventListener("focusout", ({ target }) => {
     const key = target.dataset?.field;
-    if (key && !target.hasAttribute("aria-invalid")) target.value = fieldText(key, values[key]);
+    if (key && !target.hasAttribute("aria-invalid")) target.value = fieldText(key, current()[key]);
   });
   // Arrow keys in a field change it by one step, with shift by ten.
   host.addEventListener("keydown", (event) => {
@@ -92,17 +99,21 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     if (!key || !up || !NUMBERS[key]) return;
     event.preventDefault();
     const { low, high, least = low, step } = NUMBERS[key], change = up * step * (event.shiftKey ? 10 : 1);
-    const typed = Number(event.target.value), from = Number.isFinite(typed) ? typed : values[key];
+    const typed = Number(event.target.value), from = Number.isFinite(typed) ? typed : current()[key];
     const next = Math.min(Math.max(Number((from + change).toFixed(6)), least), high);
     event.target.value = fieldText(key, next);
     take(key, String(next), true);
   });
   const fieldText = (key, value) => (key in NUMBERS ? String(Number(Number(value).toPrecision(6))) : value);
 
+  function disable(key, off) {
+    for (const input of all(`[data-row="${key}"] :is(input, select)`)) input.disabled = off;
+    host.querySelector(`[data-row="${key}"]`)?.classList.toggle("off", off);
+  }
+
   return {
-    /** Show values and a drawing frequency in Hz, NaN if it is unknown. */
-    show(own, drawn) {
-      values = own;
+    /** Show values, a drawing frequency in Hz, NaN if it is unknown, and which fields have errors. */
+    show(values, drawn, errors) {
       for (const input of all("[data-key]")) {
         const value = values[input.dataset.key];
         if (input.type === "radio") input.checked = input.value === value;
@@ -110,28 +121,30 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       }
       for (const input of all("[data-field]")) {
         const key = input.dataset.field;
-        if (input !== document.activeElement) input.value = fieldText(key, values[key]);
+        if (errors[key]) input.setAttribute("aria-invalid", "true");
+        else input.removeAttribute("aria-invalid");
+        if (input !== document.activeElement && !errors[key]) input.value = fieldText(key, values[key]);
       }
-      const isStill = values.shape === "point" || Boolean(values.paths);
-      toggle("size", isStill || values.shape === "polyline");
-      toggle("speed", isStill);
-      toggle("phases", values.foci < 2 || Boolean(values.paths));
-      toggle("shape", Boolean(values.paths));
-      toggle("sweep", !["line", "polyline"].includes(values.shape));
-      toggle("polyline", values.shape !== "polyline");
-      toggle("ramp", !values.pulses);
-      toggle("ratio", !values.am2 || !values.am);
-      toggle("drawn", !values.paths);
+      const { shape, foci, paths } = values, isPath = !paths && shape !== "point";
+      const isUsed = {
+        size: isPath && shape !== "polyline", speed: isPath, phases: foci > 1 && !paths, shape: !paths,
+        sweep: ["line", "polyline"].includes(shape), polyline: shape === "polyline", ramp: values.pulses,
+        ratio: values.am && values.am2, drawn: paths,
+      };
+      for (const [key, used] of Object.entries(isUsed)) disable(key, !used);
       $("drawing").textContent = drawn === 0 ? "focus at rest" : drawn ? `${drawn.toFixed(1)} Hz` : "–";
       const at = ["x", "y"].map((axis) => fieldText(axis, values[axis]));
       const digest = {
-        rhythm: values.pulses || "always on",
-        "foci-more": values.foci > 1 ? `${values.foci} foci` : "one focus",
+        rhythm: values.pulses || "always on", "foci-more": foci > 1 ? `${foci} foci` : "one focus",
         focus: `${values.height} mm, ${WORDS[values.drive]}`, "point-more": `${at.join(", ")} mm`,
       };
       for (const [id, text] of Object.entries(digest)) $(`${id}-digest`).textContent = text;
     },
-    showBodies,
+    /** Show the bodies to choose from. */
+    showBodies(bodies) {
+      $("body").innerHTML = options(bodies.map(({ name }) => name),
+        (name) => bodies.find((body) => body.name === name).title, current().body);
+    },
     /** Show a body's values, except the one that is being edited. */
     showBody(body) {
       const names = JSON.stringify([body.name, body.keys?.map(({ key }) => key)]);
@@ -144,20 +157,5 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       }
       $("body-more-digest").textContent = body.title;
     },
-    /** Mark a field as invalid or valid. */
-    mark(key, problem) {
-      const input = host.querySelector(`[data-field="${key}"]`);
-      if (problem) input?.setAttribute("aria-invalid", "true"); else input?.removeAttribute("aria-invalid");
-    },
   };
-
-  function showBodies(own) {
-    $("body").innerHTML = options(own.map(({ name }) => name),
-      (name) => own.find((body) => body.name === name).title, values.body);
-  }
-
-  function toggle(key, off) {
-    for (const input of all(`[data-row="${key}"] :is(input, select)`)) input.disabled = off;
-    host.querySelector(`[data-row="${key}"]`)?.classList.toggle("off", off);
-  }
 }

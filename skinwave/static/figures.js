@@ -18,6 +18,7 @@ const MOST_NAMES = 7, LEAST_NAMED = 0.02; // lines with a name; share of the tal
 const LARGE_RATIO = 10; // of A and B, above which A is drawn with a factor
 const LOWEST_LOG = 10; // Hz where a logarithmic axis begins
 const FLOOR = -40; // dB re the largest: smaller values count as this in a difference of maps
+const SHORTEST_PLAYED = 0.06; // s
 const PRESSURE = { per: 1, rate: 0 };
 
 const inMs = (span) => span.map((t) => 1e3 * t);
@@ -28,6 +29,16 @@ export function spanOf(name, load) {
   if (name === "last 60 ms") return [Math.max(0, duration - 0.06), duration];
   return [0, name === "all" ? duration : Math.min(period || 0.06, duration)];
 }
+
+/** Length in s of the part of a load that is played slowly: a period of its signal or rhythm. */
+export function playedOf(load) {
+  const tone = drawingFrequency(load.path) || load.am || load.envelope || 100;
+  const period = load.pulses ? rhythmPeriod(load) : 1 / tone;
+  return Math.min(Math.max(period, SHORTEST_PLAYED), load.duration);
+}
+
+/** Time in s of a state of the page: that of its clock, from the start of the plots' span. */
+export const timeOf = ({ span, clock, answer }) => spanOf(span, answer.load)[0] + clock;
 
 /** Waveform {x in ms, y} within a span in s, in the unit of a quantity. */
 function waveform(motion, [x, y], [start, end], { per, rate }) {

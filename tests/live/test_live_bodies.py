@@ -9,11 +9,10 @@ from in_browser import needs_browser
 from simple_model import MovingPressure, Rhythm, Tacton, Trajectory, from_young, sensation_level
 from simple_model.load.line_names import during_pulses
 from skinwave.bodies.supports import Mounting
-from skinwave.live import elements
-from skinwave.live.elements import BAND, element_pack
+from skinwave.live.elements import Training, element_pack
 from skinwave.live.packs import pack_of
 from skinwave.live.records import record_of
-from skinwave.live.selftest import HIGHEST, SMALLEST, exact, random_scene
+from skinwave.live.selftest import OF_ELEMENTS, Compared, exact, random_scene
 from skinwave.live.values import control_values
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import BODIES, Scene
@@ -61,15 +60,14 @@ def answer(page, name, scene):
     return page.evaluate(ANSWER, {"name": name, "values": control_values(scene, name)})
 
 
-def line_errors(page, name, made, lines_of, smallest=SMALLEST, highest=HIGHEST):
+def line_errors(page, name, made, lines_of, limits):
     errors = []
     for scene in made:
         own = answer(page, name, scene)
         lines = np.array(own["re"]) + 1j * np.array(own["im"])
         at = dict(zip(np.round(own["f"], 3), lines, strict=True))
         f, exactly = lines_of(scene)
-        strong = (f > 0) & (f <= highest)
-        strong &= np.abs(exactly) > smallest * np.abs(exactly[f > 0]).max(initial=0.0)
+        strong = limits.strong(f, np.abs(exactly))
         pairs = zip(np.round(f[strong], 3), exactly[strong], strict=True)
         errors += [abs(at[x] - a) / abs(a) for x, a in pairs]
     return np.array(errors)
@@ -85,7 +83,7 @@ def test_lines_waveforms_and_maps_of_layers_and_sheets(page, name):
     open_body(page, name, pack_of(BODIES[name]))
     lines_of, waveform_of, _ = exact(BODIES[name])
     made = scenes(name, 4)
-    assert line_errors(page, name, made, lines_of).max() < 0.005
+    assert line_errors(page, name, made, lines_of, Compared()).max() < 0.005
     assert wave_errors(page, name, made[:2], waveform_of).max() < 0.01
     rhythm = Rhythm(pulses=((0.03, 0.02), (0.02, 0.01)), ramp=0.01)
     pulsed = scenes(name, 1, rhythm=rhythm, duration=0.1)
@@ -116,13 +114,12 @@ def test_a_stretched_sheet_under_ramps_starts_from_rest(page):
         assert np.linalg.norm(u - exactly) < 0.02 * np.linalg.norm(exactly)
 
 
-def test_a_body_of_elements(page, monkeypatch):
-    monkeypatch.setattr(elements, "MOST", 250)
-    monkeypatch.setattr(elements, "SPACING", 0.0087)  # m: fewer focal spots, for the test
-    open_body(page, "palm", element_pack(BODIES["palm"], H))
+def test_a_body_of_elements(page):
+    few = Training(most=250, spacing=0.0087)
+    open_body(page, "palm", element_pack(BODIES["palm"], H, training=few))
     lines_of, waveform_of, places = exact(BODIES["palm"], H)
     made = scenes("palm", 8, places)
-    errors = line_errors(page, "palm", made, lines_of, smallest=0.1, highest=BAND)
+    errors = line_errors(page, "palm", made, lines_of, OF_ELEMENTS)
     assert np.median(errors) < 0.05
     assert np.quantile(errors, 0.9) < 0.2  # elements are much larger than the focal spot
     assert np.median(wave_errors(page, "palm", made[:5], waveform_of)) < 0.12
