@@ -1,9 +1,8 @@
 // Evaluation of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
 
-import { fourier, largestOf } from "./numeric.js";
+import { fourier, indexNear, largestOf } from "./numeric.js";
 import { strongLines } from "./surface3d.js";
-import { drawingFrequency, jumps, levelFactor, loadLines, pathSamples, positionOf, rhythmLevel,
-  rhythmPeriod } from "./load.js";
+import { drawingFrequency, jumps, loadLines, meanFactor, pathSamples, positionOf, rhythmPeriod } from "./load.js";
 
 const TAU = 2 * Math.PI;
 const PACINIAN = -13, NON_PACINIAN = 12; // dB re 1 um peak: at 250 Hz for a focal spot; at any frequency
@@ -46,13 +45,7 @@ function sensationLevel(amplitude, frequency, unit = "m") {
 }
 
 /** Amplitude of lines averaged over the rhythm, relative to that during a pulse. */
-export function meanLevel(load) {
-  if (!load.pulses) return 1;
-  const period = rhythmPeriod(load);
-  let sum = 0;
-  for (let k = 0; k < LEVELS; k++) sum += levelFactor(load, rhythmLevel(load, (k + 0.5) / LEVELS * period));
-  return sum / LEVELS;
-}
+export const meanLevel = (load) => (load.pulses ? meanFactor(load, 0, rhythmPeriod(load), LEVELS) : 1);
 
 /** Amplitudes (l,) of complex lines at a place, of the `rate`-th time derivative. */
 export function amplitudesOf(f, { re, im }, rate = 0) {
@@ -189,7 +182,7 @@ export function delayOf(kernel, motion, load) {
     if (most > strongest) [line, strongest] = [l, most];
   });
   if (line < 0) return null;
-  const f = motion.f[line], own = kernel.f.findIndex((at) => Math.abs(at - f) < 1e-6);
+  const f = motion.f[line], own = indexNear(kernel.f, f);
   if (own < 0) return null;
   const pressure = size(a, own), moved = size(b, line);
   const hasPhase = (sizes, k) => sizes[k] > 0 && sizes[k] >= WITH_PHASE * largestOf(sizes);
@@ -232,7 +225,7 @@ export function namesOf(load) {
     known.sort((a, b) => (isEven(a, b) ? b.strength - a.strength : a.effort - b.effort));
     return known.length ? nameOf(known[0].orders, symbols) : "";
   });
-  return (at) => names[f.findIndex((own) => Math.abs(own - at) < 1e-6)] ?? "";
+  return (at) => names[indexNear(f, at)] ?? "";
 }
 
 /**
@@ -245,7 +238,7 @@ export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt
   const [moved, motion] = [0, rate].map((order) => amplitudesOf(waves.f, wavesAt, order));
   const pressure = amplitudesOf(kernel.f, kernelAt), least = NEGLIGIBLE_LINE * largestOf(motion);
   return Array.from(waves.f, (f, l) => {
-    const own = kernel.f.findIndex((at) => Math.abs(at - f) < 1e-6);
+    const own = indexNear(kernel.f, f);
     return { name: names(f), f, motion: mean * motion[l], pressure: own < 0 ? 0 : mean * pressure[own],
       level: body.is_skin ? sensationLevel(moved[l], f) : null };
   }).filter((_, l) => motion[l] > least).sort((a, b) => b.motion - a.motion);

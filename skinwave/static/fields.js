@@ -2,7 +2,7 @@
 // [p * count + m].
 
 import { loadLines, spotWidth } from "./load.js";
-import { cached, divided, lagrange, zeros } from "./numeric.js";
+import { addTimes, cached, complexFrom, lagrange, product, quotients, zeros } from "./numeric.js";
 import { oscillation, underRhythm } from "./time.js";
 
 const POINTS = 8, STEPS = Array.from({ length: POINTS }, (_, k) => k); // of polynomials between places
@@ -161,11 +161,8 @@ export class FieldMotion {
 
   /** Complex amplitudes (l,) in metre at a place in metre. */
   at(x, y) {
-    const own = this.body.grid.at(this.body.values, this.body.width, x, y), out = zeros(this.f.length);
-    for (let l = 0; l < this.f.length; l++) {
-      [out.re[l], out.im[l]] = summed(own, this.amplitudes[l + this.first]);
-    }
-    return out;
+    const own = this.body.grid.at(this.body.values, this.body.width, x, y);
+    return complexFrom(this.f.length, (l) => summed(own, this.amplitudes[l + this.first]));
   }
 
   /** Complex amplitudes (l, y, x) in metre on a grid. */
@@ -201,47 +198,34 @@ export class FieldMotion {
 
   /** Complex amplitudes (p,) of exp(pole t) at a place after a jump and a bend of the level. */
   startOf(outputs, start, jump, bend) {
-    const { body } = this, out = zeros(outputs.re.length), { re, im } = out;
+    const { body } = this, own = zeros(outputs.re.length), { re, im } = own;
     this.lines.f.forEach((f, l) => {
-      const angle = 2 * Math.PI * f * start, c = Math.cos(angle), s = Math.sin(angle);
+      const angle = 2 * Math.PI * f * start;
       const add = ({ ahead, back }, share) => {
-        for (let p = 0; p < re.length; p++) {
-          re[p] += share * ((ahead.re[p] + back.re[p]) * c - (ahead.im[p] - back.im[p]) * s);
-          im[p] += share * ((ahead.im[p] + back.im[p]) * c + (ahead.re[p] - back.re[p]) * s);
-        }
+        const c = share * Math.cos(angle), s = share * Math.sin(angle);
+        addTimes(own, [c, s], ahead);
+        addTimes(own, [c, -s], back);
       };
       add(this.states[l], -jump);
       if (bend) add(overPoles(body.poles, this.states[l], f), bend);
     });
-    body.addCoupled?.(out, this, start, jump);
-    for (let p = 0; p < re.length; p++) {
-      [re[p], im[p]] = [re[p] * outputs.re[p] - im[p] * outputs.im[p],
-        re[p] * outputs.im[p] + im[p] * outputs.re[p]];
-    }
-    return out;
+    body.addCoupled?.(own, this, start, jump);
+    return complexFrom(re.length, (p) => [re[p] * outputs.re[p] - im[p] * outputs.im[p],
+      re[p] * outputs.im[p] + im[p] * outputs.re[p]]);
   }
 }
 
 /** States {ahead / (i w - pole), back / (-i w - pole)} (p,) at a frequency in Hz. */
 export function overPoles(poles, { ahead, back }, f) {
-  const omega = 2 * Math.PI * f, over = ({ re, im }, w) => {
-    const out = zeros(re.length);
-    for (let p = 0; p < re.length; p++) {
-      [out.re[p], out.im[p]] = divided(re[p], im[p], -poles.re[p], w - poles.im[p]);
-    }
-    return out;
-  };
+  const omega = 2 * Math.PI * f, over = (values, w) => quotients(values,
+    { re: poles.re.map((own) => -own), im: poles.im.map((own) => w - own) });
   return { ahead: over(ahead, omega), back: over(back, -omega) };
 }
 
 /** Sum [re, im] over poles of outputs times the state ahead plus the conjugate for the state back. */
 function stateAt(outputs, { ahead, back }) {
-  let a = 0, b = 0;
-  for (let p = 0; p < outputs.re.length; p++) {
-    a += outputs.re[p] * (ahead.re[p] + back.re[p]) - outputs.im[p] * (ahead.im[p] + back.im[p]);
-    b += outputs.re[p] * (ahead.im[p] - back.im[p]) + outputs.im[p] * (ahead.re[p] - back.re[p]);
-  }
-  return [a, b];
+  const [[a, b], [c, d]] = [ahead, back].map((each) => product(outputs, each));
+  return [a + c, b - d];
 }
 
 /** Sum [re, im] of real fields at a place times complex amplitudes. */

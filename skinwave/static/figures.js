@@ -1,8 +1,7 @@
 // The plots of an answer as data for plots.js, and what maps show of a load.
 
 import { inQuantity, lineName } from "./answer.js";
-import { drawingFrequency, gainAt, positionOf, relativeIntensity, rhythmLevel,
-  rhythmPeriod } from "./load.js";
+import { drawingFrequency, fullPressure, gainAt, positionOf, rhythmLevel, rhythmPeriod } from "./load.js";
 import { QUANTITIES, amplitudesOf, derivative, meanLevel, spectrum, thresholdAt } from "./evaluate.js";
 import { largestOf } from "./numeric.js";
 import { niceTop } from "./plots.js";
@@ -53,7 +52,7 @@ function waveform(motion, [x, y], [start, end], { per, rate }) {
 export function commandedPlot({ load }, [start, end]) {
   const tones = load.am + load.am2 + load.envelope + 50;
   const count = Math.min(Math.max(400, Math.ceil((end - start) * tones * POINTS_PER_PERIOD)), MOST_POINTS);
-  const full = load.peak * relativeIntensity(load.height) / load.foci.length;
+  const full = fullPressure(load);
   const x = new Array(count + 1), y = new Array(count + 1), own = { ...load };
   for (let k = 0; k <= count; k++) {
     const t = start + (end - start) * k / count;

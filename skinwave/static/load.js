@@ -1,6 +1,6 @@
 // The moving load of a Tacton: its path, its modulation and its spectral lines, as in simple_model.load.
 
-import { fourier, indexIn, unitCircle, zeros } from "./numeric.js";
+import { addTimes, fourier, indexIn, unitCircle, zeros } from "./numeric.js";
 
 const TAU = 2 * Math.PI;
 const FEWEST_SAMPLES = 132; // of a closed path: enough for all harmonics below 66 f_d
@@ -13,6 +13,7 @@ const PHASES = 8; // of each sinusoid: more than twice the degree of a drive law
 const NEGLIGIBLE_PART = 1e-6; // of the strength of a line
 const ROOT3 = Math.sqrt(3);
 const CORNERS = {
+  point: [[0, 0]],
   line: [[-0.5, 0], [0.5, 0]],
   triangle: [[0, 1 / ROOT3], [-0.5, -0.5 / ROOT3], [0.5, -0.5 / ROOT3]],
   square: [[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]],
@@ -77,13 +78,13 @@ function outline(path) {
   return { corners: open ? unit : [...unit, unit[0]], runsOn: !open || path.sweep === "one_way" };
 }
 
+/** Lengths along lines through corners, from the first corner to each. */
 function arc(corners) {
-  const along = [0];
-  for (let k = 1; k < corners.length; k++) {
-    along.push(along[k - 1] + Math.hypot(corners[k][0] - corners[k - 1][0],
-      corners[k][1] - corners[k - 1][1]));
-  }
-  return along;
+  let sum = 0;
+  return corners.map(([x, y], k) => {
+    const [x0, y0] = corners[Math.max(k - 1, 0)];
+    return sum += Math.hypot(x - x0, y - y0);
+  });
 }
 
 /**
@@ -104,7 +105,6 @@ export function joinedCorners({ paths, drawn }) {
 
 /** Length in metre of one period of a path that is not joined. */
 function pathLength(path) {
-  if (path.shape === "point") return 0;
   if (path.shape === "circle") return Math.PI * path.size;
   const { corners, runsOn } = outline(path);
   return arc(corners).pop() * (runsOn ? 1 : 2);
@@ -126,16 +126,12 @@ export function positionOf(path) {
     return (p) => [xs, ys].map((own) => interpolate(p * period + AFTER_JUMP, times, own));
   }
   const [cx, cy] = path.centre || [0, 0];
-  if (path.shape === "point" || pathLength(path) === 0) {
-    const [x, y] = path.shape === "polyline" ? path.points[0] : [0, 0];
-    return () => [x + cx, y + cy];
-  }
   if (path.shape === "circle") {
     return (p) => [path.size / 2 * Math.cos(TAU * p) + cx, path.size / 2 * Math.sin(TAU * p) + cy];
   }
-  const { corners, runsOn } = outline(path);
-  const along = arc(corners), whole = along[along.length - 1];
-  const xs = corners.map((c) => c[0]), ys = corners.map((c) => c[1]);
+  const { corners, runsOn } = outline(path), along = arc(corners), whole = along[along.length - 1];
+  const [xs, ys] = [0, 1].map((axis) => corners.map((at) => at[axis]));
+  if (!whole) return () => [xs[0] + cx, ys[0] + cy];
   return (p) => {
     let way = p;
     if (!runsOn) way = path.sweep === "sinusoidal" ? (1 - Math.cos(TAU * p)) / 2 : 1 - Math.abs(1 - 2 * p);
@@ -210,12 +206,22 @@ export function rhythmLevel(load, t) {
   return 0;
 }
 
-/** Pressure in Pa of each focus at a time in s, without the rhythm. */
-export function gainAt(load, t) {
-  const full = load.peak * relativeIntensity(load.height) / load.foci.length;
-  return full * DRIVES[load.drive](load.amplitude, modulationAt(load, tones(load).map((f) => TAU * f * t)),
-    load.depth);
+/** Mean factor on the pressure of the rhythm from a time in s to another, at `count` instants. */
+export function meanFactor(load, from, to, count) {
+  let sum = 0;
+  for (let k = 0; k < count; k++) {
+    const at = from + (k + 0.5) / count * (to - from);
+    if (at > 0) sum += levelFactor(load, rhythmLevel(load, at)); // which is 0 before the start
+  }
+  return sum / count;
 }
+
+/** Pressure in Pa of each focus at full drive. */
+export const fullPressure = ({ peak, height, foci }) => peak * relativeIntensity(height) / foci.length;
+
+/** Pressure in Pa of each focus at a time in s, without the rhythm. */
+export const gainAt = (load, t) => fullPressure(load) * DRIVES[load.drive](
+  load.amplitude, modulationAt(load, tones(load).map((f) => TAU * f * t)), load.depth);
 
 /** Factor on the pressure of a level of the amplitude from 0 to 1. */
 export const levelFactor = (load, level) => DRIVES[load.drive](level, 1, load.depth);
@@ -225,7 +231,7 @@ export function gainLines(load) {
   const fs = tones(load), counts = fs.map((f) => (f > 0 ? PHASES : 1));
   const strides = [counts[1] * counts[2], counts[2], 1], total = counts[0] * strides[0];
   const places = (k) => counts.map((count, axis) => Math.floor(k / strides[axis]) % count);
-  const full = load.peak * relativeIntensity(load.height) / load.foci.length;
+  const full = fullPressure(load);
   let re = Float64Array.from({ length: total }, (_, k) => {
     const phases = places(k).map((j, axis) => TAU * j / counts[axis]);
     return full / total * DRIVES[load.drive](load.amplitude, modulationAt(load, phases), load.depth);
@@ -313,17 +319,13 @@ export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 100
     .sort((a, b) => a.f - b.f);
   const harmonics = new Map();
   const w = lines.map(({ f, strength, parts }) => {
-    const { re, im } = zeros(count), twice = f > 0 ? 2 : 1;
+    const sum = zeros(count), twice = f > 0 ? 2 : 1;
     for (const part of parts) {
       if (part.strength < NEGLIGIBLE_PART * strength) continue;
       if (!harmonics.has(part.n)) harmonics.set(part.n, pathHarmonic(load, part.n, count));
-      const h = harmonics.get(part.n), cr = twice * part.re, ci = twice * part.im;
-      for (let q = 0; q < count; q++) {
-        re[q] += cr * h.re[q] - ci * h.im[q];
-        im[q] += cr * h.im[q] + ci * h.re[q];
-      }
+      addTimes(sum, [twice * part.re, twice * part.im], harmonics.get(part.n));
     }
-    return { re, im };
+    return sum;
   });
   const f = Float64Array.from(lines, (line) => line.f);
   return { f, w, samples, parts: lines.map((line) => line.parts) };

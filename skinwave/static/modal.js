@@ -3,7 +3,7 @@
 // where c is the complex modulus of bending over that of the modes, minus 1 (see skinwave.live.sheets).
 
 import { FieldMotion, Grid, PathForces, byPlace } from "./fields.js";
-import { divided, zeros } from "./numeric.js";
+import { addTimes, complexFrom, divided, product, quotients, zeros } from "./numeric.js";
 
 // Cubic stiffness acts on a sinusoid 3/2 times as much as the mean of its square. Single lines change up to
 // several times as much as all, and free vibration after the start stretches the sheet, too.
@@ -48,10 +48,9 @@ export class ModalBody {
     const { poles, kinds, modes } = this, place = new Float64Array(modes), speed = new Float64Array(modes);
     lines.f.forEach((f, l) => {
       const omega = 2 * Math.PI * f, c = Math.cos(omega * start), s = Math.sin(omega * start);
-      const { re: dr, im: di } = this.stiffness(f), force = forces[l], q = amplitudes[l];
+      const plain = quotients(forces[l], this.stiffness(f)), q = amplitudes[l];
       for (let m = 0; m < modes; m++) {
-        const [pr, pi] = divided(force.re[m], force.im[m], dr[m], di[m]);
-        const a = q.re[m] - pr, b = q.im[m] - pi;
+        const a = q.re[m] - plain.re[m], b = q.im[m] - plain.im[m];
         place[m] -= jump * (a * c - b * s);
         speed[m] += jump * omega * (a * s + b * c);
       }
@@ -106,12 +105,11 @@ export class ModalBody {
     let change = 0, all = 0;
     f.forEach((at, l) => {
       if (!at) return;
-      const { re: dr, im: di } = this.stiffness(at), { re, im } = forces[l];
+      const { re, im } = this.stiffness(at), linear = quotients(forces[l], { re, im });
+      const stiffer = quotients(forces[l], { re: re.map((own, m) => own + stretched * slopes[m]), im });
       for (let m = 0; m < this.modes; m++) {
-        const [a, b] = divided(re[m], im[m], dr[m], di[m]);
-        const [c, d] = divided(re[m], im[m], dr[m] + stretched * slopes[m], di[m]);
-        all += a * a + b * b;
-        change += (a - c) ** 2 + (b - d) ** 2;
+        all += linear.re[m] ** 2 + linear.im[m] ** 2;
+        change += (linear.re[m] - stiffer.re[m]) ** 2 + (linear.im[m] - stiffer.im[m]) ** 2;
       }
     });
     return all ? WORST * Math.sqrt(change / all) : 0;
@@ -119,18 +117,17 @@ export class ModalBody {
 
   /** The dynamic stiffness times modal coordinates (m,). */
   multiplied(q, { re: dr, im: di, factor: [c, s] }) {
-    const { modes, between, coupled: n } = this, out = zeros(modes);
-    for (let m = 0, k = 0; m < modes; m++) {
+    const { between, coupled: n } = this;
+    return complexFrom(this.modes, (m) => {
       let a = 0, b = 0;
-      for (let i = 0; m < n && i < n; i++, k++) {
+      for (let i = 0, k = m * n; m < n && i < n; i++, k++) {
         if (i === m) continue; // part of the diagonal
         a += between[k] * q.re[i];
         b += between[k] * q.im[i];
       }
-      out.re[m] = dr[m] * q.re[m] - di[m] * q.im[m] + c * a - s * b;
-      out.im[m] = dr[m] * q.im[m] + di[m] * q.re[m] + c * b + s * a;
-    }
-    return out;
+      return [dr[m] * q.re[m] - di[m] * q.im[m] + c * a - s * b,
+        dr[m] * q.im[m] + di[m] * q.re[m] + c * b + s * a];
+    });
   }
 }
 
@@ -142,30 +139,3 @@ function lawAt(step, law, frequency) {
 }
 
 const sizeOf = ({ re, im }) => Math.sqrt(re.reduce((sum, v, k) => sum + v * v + im[k] * im[k], 0));
-
-/** Quotients (m,) of complex values. */
-function quotients({ re, im }, below) {
-  const out = zeros(re.length);
-  for (let m = 0; m < re.length; m++) {
-    [out.re[m], out.im[m]] = divided(re[m], im[m], below.re[m], below.im[m]);
-  }
-  return out;
-}
-
-/** Sum [re, im] of products of complex values, without conjugation. */
-function product(a, b) {
-  let re = 0, im = 0;
-  for (let m = 0; m < a.re.length; m++) {
-    re += a.re[m] * b.re[m] - a.im[m] * b.im[m];
-    im += a.re[m] * b.im[m] + a.im[m] * b.re[m];
-  }
-  return [re, im];
-}
-
-/** Add a complex factor times `from` to complex values, in place. */
-function addTimes({ re, im }, [c, s], from) {
-  for (let m = 0; m < re.length; m++) {
-    re[m] += c * from.re[m] - s * from.im[m];
-    im[m] += c * from.im[m] + s * from.re[m];
-  }
-}

@@ -16,11 +16,8 @@ const unitCircles = new Map();
 
 /** Cosines and sines (n,) of the angles 2 pi k / n. */
 export const unitCircle = (n) => cached(unitCircles, n, () => {
-  const cos = new Float64Array(n), sin = new Float64Array(n);
-  for (let k = 0; k < n; k++) {
-    cos[k] = Math.cos(2 * Math.PI * k / n);
-    sin[k] = Math.sin(2 * Math.PI * k / n);
-  }
+  const [cos, sin] = [Math.cos, Math.sin].map((of) => (
+    Float64Array.from({ length: n }, (_, k) => of(2 * Math.PI * k / n))));
   return { cos, sin };
 }, 16);
 
@@ -115,3 +112,35 @@ export function divided(a, b, c, d) {
   const size = c * c + d * d;
   return [(a * c + b * d) / size, (b * c - a * d) / size];
 }
+
+/** Complex values {re, im} (n,) from a function of the index that gives [re, im]. */
+export function complexFrom(count, valueAt) {
+  const out = zeros(count);
+  for (let k = 0; k < count; k++) [out.re[k], out.im[k]] = valueAt(k);
+  return out;
+}
+
+/** Quotients (n,) of complex values. */
+export const quotients = (above, below) => complexFrom(above.re.length, (k) => (
+  divided(above.re[k], above.im[k], below.re[k], below.im[k])));
+
+/** Sum [re, im] of products of complex values, without conjugation. */
+export function product(a, b) {
+  let re = 0, im = 0;
+  for (let k = 0; k < a.re.length; k++) {
+    re += a.re[k] * b.re[k] - a.im[k] * b.im[k];
+    im += a.re[k] * b.im[k] + a.im[k] * b.re[k];
+  }
+  return [re, im];
+}
+
+/** Add a complex factor [c, s] times `from` to complex values, in place. */
+export function addTimes({ re, im }, [c, s], from) {
+  for (let k = 0; k < re.length; k++) {
+    re[k] += c * from.re[k] - s * from.im[k];
+    im[k] += c * from.im[k] + s * from.re[k];
+  }
+}
+
+/** Index of the value that differs from x by less than `within`; -1 if there is none. */
+export const indexNear = (values, x, within = 1e-6) => values.findIndex((own) => Math.abs(own - x) < within);

@@ -4,9 +4,8 @@
 // along a path of complex k (see skinwave.live.radial).
 
 import { samplesKey } from "./fields.js";
-import { cached, indexIn, lagrange, powerOfTwo, transform, zeros } from "./numeric.js";
-import { drawingFrequency, gainAt, gainLines, levelFactor, loadLines, pathHarmonic, rhythmLevel,
-  spotWidth } from "./load.js";
+import { addTimes, cached, complexFrom, indexIn, lagrange, powerOfTwo, transform, zeros } from "./numeric.js";
+import { drawingFrequency, gainAt, gainLines, loadLines, meanFactor, pathHarmonic, spotWidth } from "./load.js";
 
 /** Bessel function J0 of a complex argument with a positive real part: [re, im], to about 1e-7. */
 export function besselJ0(a, b) {
@@ -54,16 +53,6 @@ const LEVELS = 8; // of a rhythm, averaged in a time step
 const NEGLIGIBLE_HARMONIC = 1e-4; // of the largest harmonic of a path
 const BROADEST = 6.5; // over the width of a spot: its transform is negligible at larger wavenumbers
 
-/** Mean of the rhythm's factor on the pressure in the time step about t in s; 0 before the start. */
-function meanLevel(load, t, step) {
-  let sum = 0;
-  for (let k = 0; k < LEVELS; k++) {
-    const at = t + ((k + 0.5) / LEVELS - 0.5) * step;
-    if (at > 0) sum += levelFactor(load, rhythmLevel(load, at));
-  }
-  return sum / LEVELS;
-}
-
 /** Index of the first of four neighbours of x in ascending values, and their weights in a cubic. */
 function neighbours(values, x) {
   const first = Math.min(Math.max(indexIn(values, x) - 1, 0), values.length - 4);
@@ -80,15 +69,11 @@ export class RadialBody {
     Object.assign(this, pack, { tables: new Map() });
     this.distances = Float64Array.from({ length: pack.n_distances },
       (_, j) => j * pack.furthest / (pack.n_distances - 1));
-    const n = this.k.re.length, m = this.distances.length;
-    this.bessel = zeros(n * m);
-    for (let i = 0; i < n; i++) {
-      this.distances.forEach((r, j) => {
-        const [re, im] = r ? besselJ0(this.k.re[i] * r, this.k.im[i] * r) : [1, 0];
-        this.bessel.re[i * m + j] = re;
-        this.bessel.im[i * m + j] = im;
-      });
-    }
+    const { re, im } = this.k, m = this.distances.length;
+    this.bessel = complexFrom(re.length * m, (j) => {
+      const i = Math.floor(j / m), r = this.distances[j % m];
+      return r ? besselJ0(re[i] * r, im[i] * r) : [1, 0];
+    });
   }
 
   motion(load) { return new RadialMotion(this, load); }
@@ -97,16 +82,13 @@ export class RadialBody {
   spotFactors(height) {
     const variance = spotWidth(height) ** 2;
     const used = this.k.re.findIndex((a) => a * a * variance > BROADEST ** 2);
-    const { re, im } = zeros(used < 0 ? this.k.re.length : used);
-    for (let i = 0; i < re.length; i++) {
+    return complexFrom(used < 0 ? this.k.re.length : used, (i) => {
       const a = this.k.re[i], b = this.k.im[i], wr = this.weights.re[i], wi = this.weights.im[i];
       const damp = variance * Math.exp(-(a * a - b * b) * variance / 2), angle = -a * b * variance;
       const sr = damp * Math.cos(angle), si = damp * Math.sin(angle);
       const pr = sr * a - si * b, pi = sr * b + si * a;
-      re[i] = pr * wr - pi * wi;
-      im[i] = pr * wi + pi * wr;
-    }
-    return { re, im };
+      return [pr * wr - pi * wi, pr * wi + pi * wr];
+    });
   }
 
   /** Motion g {re, im} (f, r) in m/Pa at the distances from a focal spot, for a height in metre. */
@@ -208,7 +190,7 @@ class RadialMotion {
     const given = Math.ceil(n / coarser), size = powerOfTwo(given + Math.round(TAIL / step));
     const bins = Math.min(size / 2, Math.floor(HIGHEST * size * step) + 1);
     const gain = Float64Array.from({ length: given },
-      (_, k) => gainAt(load, k * step) * meanLevel(load, k * step, step));
+      (_, k) => gainAt(load, k * step) * meanFactor(load, (k - 0.5) * step, (k + 0.5) * step, LEVELS));
     const harmonics = this.harmonicsAt(x, y);
     const stencils = Array.from({ length: bins }, (_, k) => neighbours(body.frequencies, k / (size * step)));
     const { re: ur, im: ui } = zeros(size * coarser), { re: qr, im: qi } = zeros(size);
@@ -270,13 +252,7 @@ class RadialMotion {
 
 /** A harmonic of the path {order, re, im (f,), size} of motions at a place for each sample of the path. */
 function harmonic(passing, order, load) {
-  const w = pathHarmonic(load, order, passing.length), { re, im } = zeros(passing[0].re.length);
-  passing.forEach((g, q) => {
-    const wr = w.re[q], wi = w.im[q];
-    for (let f = 0; f < re.length; f++) {
-      re[f] += g.re[f] * wr - g.im[f] * wi;
-      im[f] += g.re[f] * wi + g.im[f] * wr;
-    }
-  });
+  const w = pathHarmonic(load, order, passing.length), sum = zeros(passing[0].re.length), { re, im } = sum;
+  passing.forEach((g, q) => addTimes(sum, [w.re[q], w.im[q]], g));
   return { order, re, im, size: Math.max(...re.map((value, f) => Math.hypot(value, im[f]))) };
 }

@@ -1,5 +1,6 @@
 // The self-test: random Tactons with lines that independent models in Python computed.
 
+import { indexNear } from "./numeric.js";
 import { escaped, rounded } from "./text.js";
 import { STARTS } from "./values.js";
 
@@ -9,7 +10,7 @@ const SAME_LINE = 1e-3; // Hz between a line of the page and that of Python
 function compare(motion, at, lines) {
   let worst = { error: 0, f: 0 };
   for (const { f, re, im } of lines) {
-    const k = Array.from(motion.f).findIndex((own) => Math.abs(own - f) < SAME_LINE);
+    const k = indexNear(motion.f, f, SAME_LINE);
     const error = k < 0 ? 1 : Math.hypot(at.re[k] - re, at.im[k] - im) / Math.hypot(re, im);
     if (error > worst.error) worst = { error, f };
   }

@@ -2,6 +2,7 @@
 
 import { inQuantity, lineName, typeset } from "./answer.js";
 import { QUANTITIES, lineTable, meanLevel } from "./evaluate.js";
+import { indexNear } from "./numeric.js";
 import { escaped, rounded, signed } from "./text.js";
 import { LABELS, STARTS, textOf } from "./values.js";
 
@@ -63,7 +64,7 @@ export function linesTable(answer, pinned) {
   const name = answer.values.quantity, { unit, per } = QUANTITIES[name];
   const other = pinned && inQuantity(pinned.waves.f, pinned.wavesAt, name);
   const ofA = (f) => {
-    const k = pinned.waves.f.findIndex((at) => Math.abs(at - f) < SAME_LINE);
+    const k = indexNear(pinned.waves.f, f, SAME_LINE);
     return k < 0 ? NONE : rounded(meanLevel(pinned.load) * other[k]);
   };
   const columns = [["Line"], ["Hz"], ["Kernel, Pa"], [`Waves, ${unit}`, "waves-ink"],
