@@ -223,8 +223,32 @@ def _integrate(field: Field, w: Complex, grid: _Grid) -> Complex:
 def _grid(
     orders: tuple[int, ...], distances: tuple[float, ...], width: float, lift: float, n: int
 ) -> _Grid:
-    """Gauss-Legendre nodes on panels along the raised path. Loads of a sweep share them."""
+    """Return a grid of n nodes along the raised path. Loads of a sweep share it."""
     r = np.array(distances)
+    k, dk = _raised_path(width, lift, n)
+    spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)
+    weight = spot * k * dk / (2 * np.pi)
+    kernels = {order: weight[:, None] * _bessel(order, k[:, None], r) for order in set(orders)}
+    return _Grid(k=k, kernels=kernels)
+
+
+def integration_path(
+    field: Field, distances: Floats, frequencies: Floats, width: float, *, fewest: int = 256,
+    checked: int = 16,
+) -> tuple[Complex, Complex]:  # fmt: skip
+    """Return nodes k (n,) in 1/m and weights (n,) of a path of integration that is fine enough.
+
+    Convergence is checked at every `checked`-th frequency in rad/s and distance in m, from `fewest`
+    nodes on. Raises an ArithmeticError if no path is fine enough.
+    """
+    w, some = frequencies.astype(np.complex128), tuple(distances[::checked].tolist())
+    lift = _lift(field, distances, w[::checked], width)
+    n, _ = _resolve(field, w[::checked], partial(_grid, field.orders, some, width, lift), fewest)
+    return _raised_path(width, _lift(field, distances, w, width), n)
+
+
+def _raised_path(width: float, lift: float, n: int) -> tuple[Complex, Complex]:
+    """Gauss-Legendre nodes k (n,) and weights dk (n,) on panels along the raised path, 1/m."""
     nodes, weights = np.polynomial.legendre.leggauss(16)
     # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
     edges = 6.5 / width * np.linspace(0, 1, n // 16 + 1) ** 2
@@ -232,11 +256,7 @@ def _grid(
     x = (middle[:, None] + half[:, None] * nodes).ravel()
     dx = (half[:, None] * weights).ravel()
     ramp = np.tanh(x / lift)
-    k, dk = x + 1j * lift * ramp, 1 + 1j * (1 - ramp**2)
-    spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)
-    weight = spot * k * dk * dx / (2 * np.pi)
-    kernels = {order: weight[:, None] * _bessel(order, k[:, None], r) for order in set(orders)}
-    return _Grid(k=k, kernels=kernels)
+    return x + 1j * lift * ramp, dx * (1 + 1j * (1 - ramp**2))
 
 
 def _bessel(n: int, k: Complex, r: Floats) -> Complex:

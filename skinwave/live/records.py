@@ -150,7 +150,7 @@ def _part(body: Body, owner: str, record: Any, name: str, label: str, **more: An
         changed = replace(record, **{name: new})
         return replace(body, **{owner: changed}) if owner else changed
 
-    shown = _five_digits(value) if isinstance(value, float) else value
+    shown = _five_digits(value) if isinstance(value, int | float) else value
     return Editable(key=name, label=label, value=shown, change=change, **more)
 
 

@@ -2,7 +2,8 @@
 
 import { fourier, indexNear, largestOf } from "./numeric.js";
 import { strongLines } from "./surface3d.js";
-import { drawingFrequency, jumps, loadLines, meanFactor, pathSamples, positionOf, rhythmPeriod } from "./load.js";
+import { drawingFrequency, jumps, loadLines, meanFactor, pathSamples, positionOf,
+  rhythmPeriod } from "./load.js";
 
 const TAU = 2 * Math.PI;
 const PACINIAN = -13, NON_PACINIAN = 12; // dB re 1 um peak: at 250 Hz for a focal spot; at any frequency

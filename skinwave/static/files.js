@@ -3,11 +3,10 @@
 import { joinedCorners } from "./load.js";
 import { QUANTITIES, lineTable } from "./evaluate.js";
 import { largestOf } from "./numeric.js";
-import { STARTS, check, loadOf, pulsesOf } from "./values.js";
+import { STARTS, check, loadOf, pulsesOf, rowsOf } from "./values.js";
 
 const NAME = "skinwave live", SESSION = "skinwave live session";
 const RATE = 10000; // Hz of waveforms
-const FULL_SCALE = 32767;
 
 const float = (value) => (Number.isInteger(value) ? `${value}.0` : `${value}`); // TOML and Python
 const pairs = (points) => `[${points.map(([x, y]) => `[${float(x)}, ${float(y)}]`).join(", ")}]`;
@@ -15,51 +14,41 @@ const cell = (value) => (/[",\n]/.test(value) ? `"${String(value).replaceAll('"'
 const csv = (header, rows) => [header, ...rows].map((row) => row.map(cell).join(",")).join("\r\n") + "\r\n";
 const digits = (value) => `${Number(value.toPrecision(9))}`;
 
-/** Scene file (TOML) of the controls' values and a body's record. */
-export function sceneToml(values, record) {
-  const { path, foci } = loadOf(values), lines = {
-    amplitude_percent: float(values.amplitude), am_frequency_hz: float(values.am),
-    second_am_frequency_hz: float(values.am2),
-    superposition: `[${values.ratio.split(":").map((w) => float(Number(w))).join(", ")}]`,
-    envelope_frequency_hz: float(values.envelope), duration_s: float(values.duration),
-    shape: `"${path.shape === "joined" ? "recorded" : path.shape}"`,
-  };
-  if (path.shape === "joined") {
-    const { points, times } = joinedCorners(path);
-    lines.points_mm = pairs(points.map(([x, y]) => [1e3 * x, 1e3 * y]));
-    lines.times_s = `[${times.map(float).join(", ")}]`;
-  } else if (path.shape !== "point") {
-    if (path.shape === "polyline") {
-      const corners = values.polyline.split(",").filter((part) => part.trim());
-      lines.points_mm = pairs(corners.map((part) => part.split("/").map(Number)));
-    } else lines.size_mm = float(values.size);
-    lines.speed_m_per_s = float(values.speed);
-    lines.sweep = `"${values.sweep}"`;
-  }
-  lines.foci = `[${foci.map(float).join(", ")}]`;
-  lines.sharing = `"${values.sharing}"`;
-  const table = (own) => Object.entries(own).map(([key, value]) => `${key} = ${value}`).join("\n");
-  const pulses = pulsesOf(values.pulses).map((pulse) => pulse.map((s) => Number((1e3 * s).toPrecision(12))));
-  const rhythm = { pulses_ms: pairs(pulses), ramp_ms: float(values.ramp) };
-  const focus = {
-    height_mm: float(values.height), drive: `"${values.drive}"`, profile: `"${values.profile}"`,
-    depth_of_modulation: float(values.modulation / 100), peak_pressure_pa: float(values.peak),
-  };
-  const probes = { points_mm: pairs([[values.x, values.y]]), quantity: `"${values.quantity}"` };
-  return [`name = "${NAME}"`, `[tacton]\n${table(lines)}`,
-    ...(pulses.length ? [`[tacton.rhythm]\n${table(rhythm)}`] : []),
-    `[focus]\n${table(focus)}`, record.toml.trim(), `[probes]\n${table(probes)}`].join("\n\n") + "\n";
-}
-
 // Keys of a scene file whose values are those of a control.
 const KEYS = {
-  "tacton.amplitude_percent": "amplitude", "tacton.am_frequency_hz": "am",
-  "tacton.second_am_frequency_hz": "am2", "tacton.envelope_frequency_hz": "envelope",
-  "tacton.duration_s": "duration", "tacton.shape": "shape", "tacton.size_mm": "size",
-  "tacton.speed_m_per_s": "speed", "tacton.sweep": "sweep", "tacton.sharing": "sharing",
-  "tacton.rhythm.ramp_ms": "ramp", "focus.height_mm": "height", "focus.drive": "drive",
-  "focus.profile": "profile", "focus.peak_pressure_pa": "peak", "probes.quantity": "quantity",
+  tacton: { amplitude_percent: "amplitude", am_frequency_hz: "am", second_am_frequency_hz: "am2",
+    envelope_frequency_hz: "envelope", duration_s: "duration", shape: "shape", size_mm: "size",
+    speed_m_per_s: "speed", sweep: "sweep", sharing: "sharing" },
+  "tacton.rhythm": { ramp_ms: "ramp" },
+  focus: { height_mm: "height", drive: "drive", profile: "profile", peak_pressure_pa: "peak" },
+  probes: { quantity: "quantity" },
 };
+
+/** Scene file (TOML) of the controls' values and a body's record. */
+export function sceneToml(values, record) {
+  const { path, foci } = loadOf(values), { shape } = path;
+  const table = (name, own) => {
+    const known = Object.entries(KEYS[name]).map(([key, control]) => [key,
+      typeof values[control] === "number" ? float(values[control]) : `"${values[control]}"`]);
+    const lines = Object.entries({ ...Object.fromEntries(known), ...own }).filter(([, value]) => value);
+    return `[${name}]\n${lines.map(([key, value]) => `${key} = ${value}`).join("\n")}`;
+  };
+  const own = { superposition: `[${values.ratio.split(":").map((w) => float(Number(w))).join(", ")}]`,
+    foci: `[${foci.map(float).join(", ")}]`, points_mm: "", times_s: "" };
+  if (shape === "joined") {
+    const { points, times } = joinedCorners(path);
+    own.shape = '"recorded"';
+    own.points_mm = pairs(points.map(([x, y]) => [1e3 * x, 1e3 * y]));
+    own.times_s = `[${times.map(float).join(", ")}]`;
+  } else if (shape === "polyline") own.points_mm = pairs(rowsOf("polyline", values.polyline));
+  if (["joined", "polyline", "point"].includes(shape)) own.size_mm = "";
+  if (["joined", "point"].includes(shape)) own.speed_m_per_s = own.sweep = "";
+  const pulses = pulsesOf(values.pulses).map((pulse) => pulse.map((s) => Number((1e3 * s).toPrecision(12))));
+  return [`name = "${NAME}"`, table("tacton", own),
+    ...(pulses.length ? [table("tacton.rhythm", { pulses_ms: pairs(pulses) })] : []),
+    table("focus", { depth_of_modulation: float(values.modulation / 100) }), record.toml.trim(),
+    table("probes", { points_mm: pairs([[values.x, values.y]]) })].join("\n\n") + "\n";
+}
 
 /**
  * Values of the controls in a scene file that this page has saved; the body is one of `bodies` with the same
@@ -82,7 +71,12 @@ export function readScene(text, name, bodies) {
   const lists = ["tacton.superposition", "tacton.foci", "probes.points_mm"];
   if (!lists.every((key) => Array.isArray(given[key]))) refuse("it is incomplete.");
   if (given["tacton.shape"] === "recorded") refuse("own paths are kept in a session only.");
-  for (const [key, own] of Object.entries(KEYS)) if (key in given) values[own] = check(own, given[key]);
+  for (const [name, keys] of Object.entries(KEYS)) {
+    for (const [key, control] of Object.entries(keys)) {
+      const value = given[`${name}.${key}`];
+      if (value !== undefined) values[control] = check(control, value);
+    }
+  }
   const rows = (key) => (given[key] ?? []).map((row) => row.join("/")).join(", ");
   const percent = (share) => Number((100 * share).toPrecision(9)), foci = given["tacton.foci"];
   const [[x, y]] = given["probes.points_mm"];
@@ -127,7 +121,7 @@ function wav({ samples, rate }) {
   const words = [16, 1 + (1 << 16), rate, 2 * rate, 2 + (16 << 16)];
   words.forEach((word, k) => bytes.setUint32(16 + 4 * k, word, true));
   bytes.setUint32(40, 2 * samples.length, true);
-  samples.forEach((value, k) => bytes.setInt16(44 + 2 * k, Math.round(FULL_SCALE * value), true));
+  samples.forEach((value, k) => bytes.setInt16(44 + 2 * k, Math.round(32767 * value), true));
   return new Uint8Array(bytes.buffer);
 }
 
@@ -171,8 +165,6 @@ const TIMES = { s: 1, ms: 1e-3, us: 1e-6 }, FREQUENCIES = { Hz: 1, kHz: 1e3 };
 const METRES = { m: 1, cm: 1e-2, mm: 1e-3, um: 1e-6, nm: 1e-9 };
 const MOTION = /^(c?m|mm|um|nm)(|\/s|\/s2)$/;
 const KINDS = { "": "displacement", "/s": "velocity", "/s2": "acceleration" };
-const OTHER_FORMATS = "skinwave web and skinwave compare read other formats.";
-const JITTER = 0.25; // of the sampling interval: times may deviate by as much
 
 /** Unit in brackets at the end of a column's title. */
 const unitIn = (title) => title.replace(/[µμ]/g, "u").replace("²", "2")
@@ -187,15 +179,18 @@ function placeIn(title) {
 /**
  * Read a measurement from a text of columns with units in the header, over time or frequency: {name,
  * quantity, places, remarks} with {times, values} or {frequencies, amplitudes} by place, in SI units. Throws
- * an Error with a sentence for users if the text has another form.
+ * an Error with a sentence for users if the text has another form. Times may deviate from equal spacing by a
+ * share `jitter` of the sampling interval.
  */
-export function readMeasurement(text, name) {
+export function readMeasurement(text, name, jitter = 0.25) {
   const lines = text.replace(/^\ufeff/, "").split(/\r?\n/).filter((line) => /^[^#%]/.test(line.trim()));
   const mark = ["\t", ";"].find((own) => lines[0]?.includes(own)) ?? ",";
   const separator = new RegExp(`${mark}(?![^(]*\\))`); // outside the brackets of a place
   const [titles = [], ...rows] = lines.map((line) => line.replaceAll('"', "").split(separator)
     .map((word) => word.trim()));
-  const refuse = (sentence) => { throw new Error(`${name}: ${sentence} ${OTHER_FORMATS}`); };
+  const refuse = (sentence) => {
+    throw new Error(`${name}: ${sentence} skinwave web and skinwave compare read other formats.`);
+  };
   const [unit, ...units] = titles.map(unitIn), kinds = units.map((own) => own.match(MOTION));
   const over = TIMES[unit] ?? FREQUENCIES[unit], isTime = unit in TIMES;
   if (!over || !kinds[0]) {
@@ -213,7 +208,7 @@ export function readMeasurement(text, name) {
     refuse("It needs at least three rows, with a number in each cell.");
   }
   const isUneven = (value, k) => value <= at[k - 1]
-    || (isTime && Math.abs(value - at[0] - k * step) > JITTER * step);
+    || (isTime && Math.abs(value - at[0] - k * step) > jitter * step);
   if (at.some(isUneven)) {
     refuse(isTime ? "The times are not equally spaced." : "The frequencies are not in ascending order.");
   }

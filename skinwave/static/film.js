@@ -1,6 +1,6 @@
 // A film of maps, recorded in real time by the browser.
 
-import { drawFrame } from "./maps.js";
+import { canvasOf, drawFrame } from "./maps.js";
 
 const SIDE = 440, GAP = 20, HEAD = 30, FOOT = 34, RATE = 30; // px; frames per second
 const NO_RECORDER = "This browser cannot record films. Use skinwave report, which writes one.";
@@ -11,8 +11,7 @@ const NO_RECORDER = "This browser cannot record films. Use skinwave report, whic
  */
 export async function filmOf(mapsAt, caption, seconds) {
   if (!window.MediaRecorder?.isTypeSupported("video/webm")) throw new Error(NO_RECORDER);
-  const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
-  [canvas.width, canvas.height] = [2 * SIDE + 3 * GAP, HEAD + SIDE + FOOT];
+  const canvas = canvasOf(2 * SIDE + 3 * GAP, HEAD + SIDE + FOOT), context = canvas.getContext("2d");
   const frame = (share) => {
     context.fillStyle = "#fff";
     context.fillRect(0, 0, canvas.width, canvas.height);

@@ -19,12 +19,8 @@ function placeOnScale({ rms, largest, decibel, signed }) {
   return signed ? (v) => 0.5 + v / (2 * largest) : (v) => v / largest;
 }
 
-function picture(width, height) {
-  const canvas = document.createElement("canvas");
-  canvas.width = width;
-  canvas.height = height;
-  return canvas;
-}
+/** A new canvas of a size in px. */
+export const canvasOf = (width, height) => Object.assign(document.createElement("canvas"), { width, height });
 
 /** Paint the values on a canvas, one pixel for each place; transparent off the body. */
 function paint(canvas, options) {
@@ -41,11 +37,11 @@ function paint(canvas, options) {
 
 const sideOf = ({ rms }) => Math.round(Math.sqrt(rms.length)); // places along a side of a map
 
-const bars = new Map();
+const bars = new Map(); // images by table of colours
 
 /** Image of the colours of a scale, left to right. */
 const bar = (table) => cached(bars, table, () => {
-  const made = picture(TABLE_LENGTH, 1);
+  const made = canvasOf(TABLE_LENGTH, 1);
   made.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(table), TABLE_LENGTH, 1), 0, 0);
   return made.toDataURL();
 });
@@ -128,11 +124,9 @@ function inside(options, { box, image: url }) {
   }
   parts.push(`<g class="foci">${fociMarkup(options, box)}</g>`);
   if (point) {
-    const [x, y] = at(point);
-    for (const [colour, width] of [["#fff", 4], [COLOURS.point, 2.2]]) {
-      const ends = [[x - 5, y - 5], [x + 5, y + 5], [x - 5, y + 5], [x + 5, y - 5]];
-      parts.push(line(ends, { colour, width, apart: 2 }));
-    }
+    const [x, y] = at(point), ends = [[x - 5, y - 5], [x + 5, y + 5], [x - 5, y + 5], [x + 5, y - 5]];
+    parts.push(line(ends, { colour: "#fff", width: 4, apart: 2 }),
+      line(ends, { colour: COLOURS.point, width: 2.2, apart: 2 }));
   }
   return parts.join("");
 }
@@ -194,7 +188,7 @@ function imagesOf(options, before) {
   const keys = ["rms", "largest", "decibel", "signed", "moving"];
   const same = before && keys.every((key) => before.options[key] === options[key]);
   if (same) return { image: before?.image, bar: before?.bar };
-  const n = sideOf(options), painted = options.moving ? null : paint(picture(n, n), options);
+  const n = sideOf(options), painted = options.moving ? null : paint(canvasOf(n, n), options);
   return { image: painted?.toDataURL(), bar: bar(options.signed ? SIGNED : SEQUENTIAL) };
 }
 
@@ -203,16 +197,15 @@ function canvasBelow(svg, options, { x, y, side }) {
   let canvas = svg.previousElementSibling;
   if (canvas?.className !== "moving") {
     if (!options.moving) return null;
-    canvas = document.createElement("canvas");
+    canvas = canvasOf(sideOf(options), sideOf(options));
     canvas.className = "moving";
     svg.before(canvas);
   }
   canvas.hidden = !options.moving;
-  const n = sideOf(options), cell = side / (n - 1), own = svg.getBoundingClientRect();
-  const around = svg.parentElement.getBoundingClientRect();
+  const cell = side / (sideOf(options) - 1);
+  const [own, around] = [svg, svg.parentElement].map((each) => each.getBoundingClientRect());
   const within = { left: own.left - around.left + x - cell / 2, top: own.top - around.top + y - cell / 2,
     width: side + cell, height: side + cell };
-  if (canvas.width !== n) [canvas.width, canvas.height] = [n, n];
   for (const [name, length] of Object.entries(within)) canvas.style[name] = `${length}px`;
   canvas.style.clipPath = `inset(${cell / 2}px)`;
   return canvas;
@@ -221,7 +214,7 @@ function canvasBelow(svg, options, { x, y, side }) {
 /** Draw a map with its title, paths and foci on a canvas. */
 export function drawFrame(context, box, options) {
   const at = toPixels(box), { path, foci, title } = options, n = sideOf(options);
-  context.drawImage(paint(picture(n, n), options), box.x, box.y, box.side, box.side);
+  context.drawImage(paint(canvasOf(n, n), options), box.x, box.y, box.side, box.side);
   const stroke = (colour, width, points, isClosed) => {
     Object.assign(context, { strokeStyle: colour, lineWidth: width });
     context.beginPath();

@@ -509,6 +509,7 @@ function begin() {
   const values = { ...own, body: recordOf(own.body).name };
   update({ values, past: { steps: [values], at: 0 }, notice: refused.join(" "), playing: false,
     look: LOOKS.includes(view.view) ? view.view : "maps", tab: TABS.includes(view.tab) ? view.tab : "lines" });
+  onFrame(performance.now());
   if (view.selftest !== undefined) runSelftest(data, bodyOf, loadOf);
 }
 

@@ -5,7 +5,8 @@
 
 import { samplesKey } from "./fields.js";
 import { addTimes, cached, complexFrom, indexIn, lagrange, powerOfTwo, transform, zeros } from "./numeric.js";
-import { drawingFrequency, gainAt, gainLines, loadLines, meanFactor, pathHarmonic, spotWidth } from "./load.js";
+import { drawingFrequency, gainAt, gainLines, loadLines, meanFactor, pathHarmonic,
+  spotWidth } from "./load.js";
 
 /** Bessel function J0 of a complex argument with a positive real part: [re, im], to about 1e-7. */
 export function besselJ0(a, b) {

@@ -1,5 +1,6 @@
 // The menu to save figures and data.
 
+import { canvasOf } from "./maps.js";
 import { escaped } from "./text.js";
 import { textOf } from "./values.js";
 
@@ -57,8 +58,7 @@ async function pngOf({ text, width, height }) {
   const picture = new Image();
   picture.src = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
   await picture.decode();
-  const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [Math.round(2 * width), Math.round(2 * height)];
+  const canvas = canvasOf(Math.round(2 * width), Math.round(2 * height));
   canvas.getContext("2d").drawImage(picture, 0, 0, canvas.width, canvas.height);
   URL.revokeObjectURL(picture.src);
   return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));

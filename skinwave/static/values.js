@@ -86,7 +86,7 @@ const TEXTS = {
 };
 
 /** Rows [[...]] of the text of a control, in its units. Throws an Error with a sentence for users. */
-function rowsOf(key, text) {
+export function rowsOf(key, text) {
   const { count, words, most, like, isValid } = TEXTS[key];
   const rows = parts(text).map((part) => {
     const cells = part.split("/"), word = words ? [cells.shift().trim()] : [];
@@ -147,17 +147,11 @@ export function check(key, text) {
     return given;
   }
   const { unit, low, high, least = low } = NUMBERS[key], value = toNumber(given.replace(",", "."));
-  const range = `a value from ${least} to ${inUnit(high, unit)}`;
-  if (!Number.isFinite(value)) {
-    throw new Error(`${label}: "${short(given)}" is not a number. Give ${range}.`);
-  }
-  if (value < least || value > high) {
-    throw new Error(`${label}: ${inUnit(short(given), unit)} is out of range. Give ${range}.`);
-  }
-  if (key === "foci" && !Number.isInteger(value)) {
-    throw new Error(`${label}: ${value} is not a whole number. Give ${range}.`);
-  }
-  return value;
+  const problem = !Number.isFinite(value) ? `"${short(given)}" is not a number`
+    : value < least || value > high ? `${inUnit(short(given), unit)} is out of range`
+      : key === "foci" && !Number.isInteger(value) ? `${value} is not a whole number` : "";
+  if (!problem) return value;
+  throw new Error(`${label}: ${problem}. Give a value from ${least} to ${inUnit(high, unit)}.`);
 }
 
 /** Text of a value of a control, with its unit. */
@@ -184,24 +178,21 @@ const evenly = (n) => Array.from({ length: n }, (_, k) => k / n);
 /** Path and phases of the foci {path, foci} of a load. */
 function pathAndFoci(values) {
   const n = values.foci, own = pathsOf(values.paths);
-  if (own.length) {
-    if (own.length !== n) {
-      throw new Error(`Own paths: there are ${own.length} paths and ${n} foci. Give one for each focus.`);
-    }
-    return { path: { shape: "joined", paths: own, drawn: values.drawn }, foci: evenly(n) };
-  }
+  const expectOneEach = (rows, title, words) => {
+    if (!rows.length || rows.length === n) return;
+    throw new Error(`${title}: there are ${rows.length} ${words} and ${n} foci. Give one for each focus.`);
+  };
+  expectOneEach(own, "Own paths", "paths");
+  if (own.length) return { path: { shape: "joined", paths: own, drawn: values.drawn }, foci: evenly(n) };
   const phases = rowsOf("phases", values.phases).map(([phase]) => phase / 100), { shape, sweep } = values;
-  if (phases.length && phases.length !== n) {
-    throw new Error(`Phases: there are ${phases.length} phases and ${n} foci. Give one for each focus.`);
-  }
-  const foci = phases.length ? phases : evenly(n);
-  if (shape === "point") return { path: { shape, size: 0, speed: 0, sweep, centre: [0, 0] }, foci };
+  expectOneEach(phases, "Phases", "phases");
+  const path = { shape, size: 0, speed: shape === "point" ? 0 : values.speed, sweep, centre: [0, 0] };
+  if (SHAPES.includes(shape) && shape !== "point") path.size = values.size / 1e3;
   if (shape === "polyline") {
-    const points = rowsOf("polyline", values.polyline).map(([x, y]) => [x / 1e3, y / 1e3]);
-    if (points.length < 2) throw new Error("A polyline needs two corners or more, such as 0/0, 10/0.");
-    return { path: { shape, size: 0, speed: values.speed, sweep, points, centre: [0, 0] }, foci };
+    path.points = rowsOf("polyline", values.polyline).map(([x, y]) => [x / 1e3, y / 1e3]);
+    if (path.points.length < 2) throw new Error("A polyline needs two corners or more, such as 0/0, 10/0.");
   }
-  return { path: { shape, size: values.size / 1e3, speed: values.speed, sweep, centre: [0, 0] }, foci };
+  return { path, foci: phases.length ? phases : evenly(n) };
 }
 
 /** Largest distance [x, y] in metre of the path of a load from the origin along each axis. */

@@ -84,7 +84,13 @@ class View {
     gl.useProgram(program);
     const names = ["turn", "middle", "size"];
     this.uniforms = Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(program, name)]));
-    this.buffers = { places: gl.createBuffer(), state: gl.createBuffer(), triangles: gl.createBuffer() };
+    this.buffers = { places: gl.createBuffer(), state: gl.createBuffer() };
+    const { places, state } = this.buffers;
+    [[places, 3, 0, 0], [state, 2, 20, 0], [state, 3, 20, 8]].forEach(([buffer, size, stride, offset], k) => {
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.vertexAttribPointer(k, size, gl.FLOAT, false, stride, offset);
+    });
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     const looks = { MIN_FILTER: gl.LINEAR, WRAP_S: gl.CLAMP_TO_EDGE, WRAP_T: gl.CLAMP_TO_EDGE };
     for (const [key, value] of Object.entries(looks)) {
@@ -104,18 +110,19 @@ class View {
    *   period: s of the loop; unit: "Pa" for a pressure, with less pressure drawn upwards
    */
   show(scene) {
-    const { gl, buffers } = this;
+    const { gl } = this;
     if (!gl) return;
+    const { places, state } = this.buffers;
     const isNew = scene.shape !== this.scene?.shape;
     this.scene = scene;
     if (isNew) {
       this.mesh = { ...scene.shape, ...bounds(scene.shape) };
       this.moved = Float32Array.from(scene.shape.points);
       this.state = new Float32Array(5 * this.moved.length / 3);
-      gl.bindBuffer(gl.ARRAY_BUFFER, buffers.places);
+      gl.bindBuffer(gl.ARRAY_BUFFER, places);
       gl.bufferData(gl.ARRAY_BUFFER, this.mesh.points, gl.STATIC_DRAW);
-      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.mesh.triangles, gl.STATIC_DRAW);
+      gl.bindBuffer(gl.ARRAY_BUFFER, state); // which stays bound for each frame
       this.fit();
     }
     this.measure();
@@ -197,19 +204,13 @@ class View {
     gl.viewport(0, 0, width, height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     this.place();
-    const { view, buffers } = this, turn = this.turn(view), room = 0.88;
+    const { view } = this, turn = this.turn(view), room = 0.88;
     this.scale = room * view.near * Math.min(wide / 2 / this.reach[0], (tall - 24) / 2 / this.reach[1]);
     const size = [2 * this.scale / wide, 2 * this.scale / tall, 0.9 / this.deep];
     gl.uniformMatrix3fv(this.uniforms.turn, false, turn);
     gl.uniform3fv(this.uniforms.middle, this.middle);
     gl.uniform3fv(this.uniforms.size, size);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.places);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.state);
     gl.bufferData(gl.ARRAY_BUFFER, this.state, gl.DYNAMIC_DRAW);
-    gl.vertexAttribPointer(1, 2, gl.FLOAT, false, 20, 0);
-    gl.vertexAttribPointer(2, 3, gl.FLOAT, false, 20, 8);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
     gl.drawElements(gl.TRIANGLES, mesh.triangles.length, gl.UNSIGNED_INT, 0);
     const marks = view.tipped < Math.PI / 2 ? this.drawMarks(wide, tall, turn) : ""; // on the upper side
     this.over.innerHTML = marks + this.drawScale(wide, tall, turn);
@@ -343,6 +344,4 @@ class View {
  * @param {object} options onTime: called with the time in s as it changes; follows: whether another view
  *   sets the time, so that there are no controls
  */
-export function openView(container, options = {}) {
-  return new View(container, options);
-}
+export const openView = (container, options = {}) => new View(container, options);
