@@ -10,19 +10,19 @@ export function toAddress(values, starts = STARTS) {
   }).join("&");
 }
 
-/** Values {values, refused} in the text of an address; `refused` are sentences about what is ignored. */
+/** Values in the text of an address, and a sentence about what is ignored, or "": {values, refused}. */
 export function fromAddress(text, starts = STARTS) {
-  const values = { ...starts }, ignored = [];
+  const values = { ...starts }, parts = [], reasons = [];
   for (const [key, given] of new URLSearchParams(text.replace(/^[#?]/, ""))) {
     try {
       values[key] = check(key, given);
     } catch (error) {
-      ignored.push({ part: `${key}=${given}`, why: error.message });
+      parts.push(`${key}=${given}`);
+      reasons.push(error.message);
     }
   }
-  const named = ignored.map(({ part }) => part).join(", ");
-  const refused = ignored.length > 1 ? [`These parts of the address are ignored: ${named}.`]
-    : ignored.map(({ why }) => `This part of the address is ignored. ${why}`);
+  const refused = parts.length > 1 ? `These parts of the address are ignored: ${parts.join(", ")}.`
+    : reasons.map((why) => `This part of the address is ignored. ${why}`).join("");
   return { values, refused };
 }
 

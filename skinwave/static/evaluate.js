@@ -125,8 +125,8 @@ export function shareOutside(kernelRms, rms) {
 /** Function of x, y in metre that gives the distance in metre from the samples of a path. */
 function distanceFromPath(load) {
   const { x: xs, y: ys } = pathSamples(load);
-  return (x, y) => Math.sqrt(xs.reduce((least, own, q) => Math.min(least, (x - own) ** 2 + (y - ys[q]) ** 2),
-    Infinity));
+  return (x, y) => Math.sqrt(xs.reduce(
+    (least, own, q) => Math.min(least, (x - own) ** 2 + (y - ys[q]) ** 2), Infinity));
 }
 
 /**
@@ -187,9 +187,9 @@ export function delayOf(kernel, motion, load) {
   if (own < 0) return null;
   const pressure = size(a, own), moved = size(b, line);
   const hasPhase = (sizes, k) => sizes[k] > 0 && sizes[k] >= WITH_PHASE * largestOf(sizes);
-  const best = places.reduce((top, _, k) => (hasPhase(pressure, k) && hasPhase(moved, k)
-    && (top < 0 || pressure[k] > pressure[top]) ? k : top), -1);
-  if (best < 0) return null;
+  const clear = pressure.map((size, k) => (hasPhase(pressure, k) && hasPhase(moved, k) ? size : -1));
+  const most = Math.max(...clear), best = clear.indexOf(most);
+  if (most < 0) return null;
   const at = ({ re, im }, l) => ({ re: re[l], im: im[l] });
   return { delay: phaseDelay(at(a[best], own), at(b[best], line), f), f };
 }

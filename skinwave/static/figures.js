@@ -20,6 +20,7 @@ const FLOOR = -40; // dB re the largest: smaller values count as this in a diffe
 const SHORTEST_PLAYED = 0.06; // s
 const PRESSURE = { per: 1, rate: 0 };
 
+const isOn = (axis) => ({ role }) => (role === "kernel") === (axis === "y");
 const inMs = (span) => span.map((t) => 1e3 * t);
 
 /** Start and end in s of a choice of time span for a load. */
@@ -64,7 +65,7 @@ export function commandedPlot({ load }, [start, end]) {
   return {
     label: "Commanded signal over time, in per cent of full drive",
     x: { label: "time, ms", range: inMs([start, end]) }, y: { label: "%", range: [-108, 108] },
-    curves: [y, y.map((v) => -v)].map((half) => ({ role: "drive", axis: "y", x, y: half, fill: true })),
+    curves: [y, y.map((v) => -v)].map((half) => ({ role: "drive", x, y: half, fill: true })),
   };
 }
 
@@ -86,23 +87,22 @@ function nameOfA(factor) {
  */
 export function waveformPlot(answer, span, { pinned, measured, scale }) {
   const { kernel, waves, values, x, y } = answer, quantity = QUANTITIES[values.quantity];
-  const curves = [{ role: "kernel", axis: "y", name: "kernel", ...waveform(kernel, [x, y], span, PRESSURE) }];
+  const curves = [{ role: "kernel", name: "kernel", ...waveform(kernel, [x, y], span, PRESSURE) }];
   const own = waveform(waves, [x, y], span, quantity);
   if (pinned) {
     const other = waveform(pinned.waves, [pinned.x, pinned.y], span, quantity);
     const factor = factorOf(largestOf(other.y), largestOf(own.y));
-    curves.push({ role: "pinned", axis: "y2", name: nameOfA(factor), x: other.x,
-      y: other.y.map((v) => factor * v) });
+    curves.push({ role: "pinned", name: nameOfA(factor), x: other.x, y: other.y.map((v) => factor * v) });
   }
-  curves.push({ role: "waves", axis: "y2", name: pinned ? "B" : "waves", ...own });
+  curves.push({ role: "waves", name: pinned ? "B" : "waves", ...own });
   if (measured?.times && measured.quantity === values.quantity) {
-    curves.push({ role: "measured", axis: "y2", name: "measured", x: inMs(measured.times),
+    curves.push({ role: "measured", name: "measured", x: inMs(measured.times),
       y: nearestPlace(measured, answer, measured.values).map((v) => quantity.per * v) });
   }
   const axes = { y: { label: "Pa", role: "kernel" }, y2: { label: quantity.unit, role: "waves" } };
   let below = 0.04; // share of the top; the same on both axes, so that their zeros are level
   for (const [name, axis] of Object.entries(axes)) {
-    const drawn = curves.filter((curve) => curve.axis === name).flatMap((curve) => curve.y);
+    const drawn = curves.filter(isOn(name)).flatMap((curve) => curve.y);
     const peak = name === "y" ? answer.peaks?.kernel : quantity.per * (answer.peaks?.waves ?? 0);
     axis.top = scale(`waveform ${name} ${values.quantity}`, Math.max(largestOf(drawn), peak || 0));
     below = Math.max(below, -drawn.reduce((least, v) => Math.min(least, v), 0) / axis.top);
@@ -141,39 +141,39 @@ function measuredSpectrum(measured, answer, per, highest) {
 export function spectrumPlot(answer, { pinned, measured, highest, log, scale }) {
   const { kernel, waves, body, values: { quantity: name } } = answer, { unit, per, rate } = QUANTITIES[name];
   const mean = meanLevel(answer.load);
-  const stems = (role, axis, title, f, amplitudes, offset, factor = mean) => {
+  const stems = (role, title, f, amplitudes, offset, factor = mean) => {
     const visible = Array.from(f.keys()).filter((k) => f[k] <= highest);
-    return { role, axis, name: title, stems: true, offset, head: axis === "y" ? "square" : "circle",
-      x: visible.map((k) => f[k]), y: visible.map((k) => factor * amplitudes[k]) };
+    return { role, name: title, stems: true, offset, x: visible.map((k) => f[k]),
+      y: visible.map((k) => factor * amplitudes[k]) };
   };
   const wide = pinned ? 2 * STEM_SPACING : STEM_SPACING, moved = inQuantity(waves.f, answer.wavesAt, name);
-  const own = stems("waves", "y2", pinned ? "B" : "waves", waves.f, moved, wide / 2);
+  const own = stems("waves", pinned ? "B" : "waves", waves.f, moved, wide / 2);
   const pressure = amplitudesOf(kernel.f, answer.kernelAt);
-  const curves = [stems("kernel", "y", "kernel", kernel.f, pressure, -wide / 2), own];
+  const curves = [stems("kernel", "kernel", kernel.f, pressure, -wide / 2), own];
   if (pinned) {
     const moves = meanLevel(pinned.load), amplitudes = inQuantity(pinned.waves.f, pinned.wavesAt, name);
     const factor = factorOf(moves * largestOf(amplitudes), largestOf(own.y));
-    curves.push(stems("pinned", "y2", nameOfA(factor), pinned.waves.f, amplitudes, 0, factor * moves));
+    curves.push(stems("pinned", nameOfA(factor), pinned.waves.f, amplitudes, 0, factor * moves));
   }
   const axes = { y: { label: "Pa", role: "kernel" }, y2: { label: unit, role: "waves" } };
   const ofMap = ({ per: scaled, rate: order }, { f, largest } = { f: [], largest: [] }) => largest.reduce(
     (most, v, l) => Math.max(most, scaled * (2 * Math.PI * f[l]) ** order * v || 0), 0);
   for (const [axis, each] of Object.entries(axes)) {
-    const drawn = curves.filter((curve) => curve.axis === axis).map(({ y }) => largestOf(y));
+    const drawn = curves.filter(isOn(axis)).map(({ y }) => largestOf(y));
     const tallest = Math.max(...drawn, mean * (axis === "y" ? ofMap(PRESSURE, answer.maps?.kernel)
       : ofMap({ per, rate }, answer.maps?.waves)));
     each.range = [0, scale(`spectrum ${axis} ${name}`, 1.2 * tallest)];
   }
   if (measured?.quantity === name) {
-    curves.push({ role: "measured", axis: "y2", name: "measured",
+    curves.push({ role: "measured", name: "measured",
       ...measuredSpectrum(measured, answer, per, highest) });
   }
   if (body.is_skin && !rate) {
     const x = Array.from({ length: 120 }, (_, k) => 10 + k * (highest - 10) / 119);
-    curves.push({ role: "threshold", axis: "y2", name: "threshold", dash: "5 3", x,
+    curves.push({ role: "threshold", name: "threshold", dash: "5 3", x,
       y: x.map((f) => per * mean * thresholdAt(f)) });
   }
-  const names = own.x.map((f, k) => ({ x: f, y: own.y[k], axis: "y2", text: lineName(answer, f) }));
+  const names = own.x.map((f, k) => ({ x: f, y: own.y[k], text: lineName(answer, f) }));
   const least = LEAST_NAMED * largestOf(own.y);
   const named = names.filter(({ text, y }) => text && y > least).sort((a, b) => b.y - a.y)
     .slice(0, MOST_NAMES);
@@ -191,25 +191,23 @@ export function dispersionPlot(answer, highest) {
     const text = body.isRequested && !body.hasFailed ? "The dispersion curves are being computed."
       : "Dispersion curves are not available for this body.";
     return { label: text, x: { label: "frequency, Hz", range: [0, highest] },
-      y: { label: "m/s", range: [0, 10] }, curves: [], names: [{ x: highest / 2, y: 5, axis: "y", text }] };
+      y: { label: "m/s", range: [0, 10] }, curves: [], names: [{ x: highest / 2, y: 5, text }] };
   }
   const speed = drawingFrequency(path) ? path.speed : 0, across = [0, highest];
   const typical = dispersion.branches.map(({ c }) => c.filter((v) => v !== null).sort((a, b) => a - b))
     .map((c) => c[Math.floor(c.length / 2)]).filter(Number.isFinite);
   const top = niceTop(1.5 * Math.max(speed || 0, ...typical, 1));
   const curves = dispersion.branches.slice(0, 4).map(({ name, c }, k) => (
-    { role: `m${k + 1}`, axis: "y", name, x: dispersion.f, y: c.map((v) => v ?? NaN) }));
-  if (speed) curves.push({ role: "kernel", axis: "y", name: "focus", dash: "5 3", x: across, y: [speed,
-    speed] });
+    { role: `m${k + 1}`, name, x: dispersion.f, y: c.map((v) => v ?? NaN) }));
+  if (speed) curves.push({ role: "kernel", name: "focus", dash: "5 3", x: across, y: [speed, speed] });
   const sizes = amplitudesOf(waves.f, answer.wavesAt);
   const strong = Array.from(waves.f.keys()).filter((k) => waves.f[k] <= highest)
     .sort((a, b) => sizes[b] - sizes[a]).slice(0, MOST_NAMES).map((k) => waves.f[k]);
-  for (const f of strong) curves.push({ role: "now", axis: "y", x: [f, f], y: [0, top], width: 1,
-    dash: "2 3" });
+  for (const f of strong) curves.push({ role: "now", x: [f, f], y: [0, top], width: 1, dash: "2 3" });
   return {
     label: "Phase speed of the body's waves over frequency, with the lines of the load",
     x: { label: "frequency, Hz", range: across }, y: { label: "m/s", range: [0, top] }, curves,
-    names: strong.map((f) => ({ x: f, y: 0.8 * top, axis: "y", text: lineName(answer, f) })),
+    names: strong.map((f) => ({ x: f, y: 0.8 * top, text: lineName(answer, f) })),
   };
 }
 
@@ -224,13 +222,13 @@ export function levelPlot(answer, key, { x, kernel, waves, best }) {
     label: `Sensation level over ${label}`, x: { label: `${label}, ${unit}`, range: OVER[key] },
     y: { label: "dB above threshold", range: [low, top] },
     curves: [
-      { role: "kernel", axis: "y", x, y: kernel,
+      { role: "kernel", x, y: kernel,
         name: answer.body.is_skin ? "kernel" : "kernel only: this body is not skin" },
-      ...(answer.body.is_skin ? [{ role: "waves", axis: "y", name: "waves", x, y: waves }] : []),
-      { role: "threshold", axis: "y", x: OVER[key], y: [0, 0], dash: "5 3" },
-      { role: "now", axis: "y", name: "now", x: [now, now], y: [low, top], dash: "2 3" },
+      ...(answer.body.is_skin ? [{ role: "waves", name: "waves", x, y: waves }] : []),
+      { role: "threshold", x: OVER[key], y: [0, 0], dash: "5 3" },
+      { role: "now", name: "now", x: [now, now], y: [low, top], dash: "2 3" },
     ],
-    names: best ? [{ x: best.at, y: best.level, axis: "y", text }] : [],
+    names: best ? [{ x: best.at, y: best.level, text }] : [],
   };
 }
 

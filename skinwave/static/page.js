@@ -507,7 +507,7 @@ function listen() {
 function begin() {
   const { values: own, refused, view } = readAddress(starts);
   const values = { ...own, body: recordOf(own.body).name };
-  update({ values, past: { steps: [values], at: 0 }, notice: refused.join(" "), playing: false,
+  update({ values, past: { steps: [values], at: 0 }, notice: refused, playing: false,
     look: LOOKS.includes(view.view) ? view.view : "maps", tab: TABS.includes(view.tab) ? view.tab : "lines" });
   onFrame(performance.now());
   if (view.selftest !== undefined) runSelftest(data, bodyOf, loadOf);

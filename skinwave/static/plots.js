@@ -3,7 +3,6 @@
 import { indexIn } from "./numeric.js";
 import { escaped, rounded } from "./text.js";
 
-const NS = "http://www.w3.org/2000/svg";
 const LEFT = 44, RIGHT = 46, TOP = 20, BOTTOM = 20;
 const NAME_HEIGHT = 13, READING_DISTANCE = 14; // px
 
@@ -49,6 +48,8 @@ function atStep(value, step) {
   return (Math.abs(value) < 1e-9 * step ? 0 : value).toFixed(Math.min(decimals, 6)).replace("-", "−");
 }
 
+const dashed = ({ dash }) => (dash ? ` stroke-dasharray="${dash}"` : "");
+
 /** SVG of a name such as f_d or 2 f_AM − f_d: what follows an underscore is a subscript. */
 const subscripted = (name) => escaped(name).replace(/_(\w+)/g,
   '<tspan dy="2.5" font-size="80%">$1</tspan><tspan dy="-2.5">&#8203;</tspan>');
@@ -56,20 +57,14 @@ const subscripted = (name) => escaped(name).replace(/_(\w+)/g,
 /**
  * A plot inside an element.
  *
- * `draw(spec)` takes { x: {label, range, log}, y: {label, range, role}, y2, curves, names, hatched, label }. A
- * curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset}; names are [{x, y, axis,
- * text}], the most important first.
+ * `draw(spec)` takes { x: {label, range, log}, y: {label, range, role}, y2, curves, names, hatched, label }.
+ * A curve has {role, x, y, name, width, dash, fill, stems, offset}. Names are [{x, y, text}], the most
+ * important first. If there are two axes, only the kernel is on the first one.
  */
 export function createPlot(host, { announce }) {
-  const svg = document.createElementNS(NS, "svg");
-  svg.setAttribute("tabindex", "0");
-  svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", "Plot, not yet drawn");
-  svg.classList.add("plot");
-  const picture = document.createElementNS(NS, "g"), over = document.createElementNS(NS, "g");
-  svg.append(picture, over);
-  host.append(svg);
-  const clip = `clip-${host.id}`;
+  host.innerHTML = `<svg tabindex="0" role="img" aria-label="Plot, not yet drawn" class="plot"><g></g><g></g>
+    </svg>`;
+  const svg = host.firstElementChild, [picture, over] = svg.children, clip = `clip-${host.id}`;
   let spec = null, size = [0, 0], cursor = null, selected = -1;
 
   const area = () => [LEFT, TOP, size[0] - RIGHT, size[1] - BOTTOM];
@@ -78,6 +73,7 @@ export function createPlot(host, { announce }) {
     const [low, high] = spec.x.range.map(scaled);
     return x0 + (x1 - x0) * (scaled(v) - low) / (high - low || 1);
   };
+  const axisOf = (role) => (spec.y2 && role !== "kernel" ? "y2" : "y");
   const toY = (v, axis) => {
     const [, y0, , y1] = area(), [low, high] = spec[axis].range;
     return y1 - (y1 - y0) * (v - low) / (high - low || 1);
@@ -127,32 +123,32 @@ export function createPlot(host, { announce }) {
   }
 
   function line(curve) {
-    const { x: xs, y: ys } = curve, [low, high] = spec[curve.axis].range, reach = 2 * (high - low);
+    const { x: xs, y: ys, role } = curve, axis = axisOf(role);
+    const [low, high] = spec[axis].range, reach = 2 * (high - low);
     let d = "", on = false;
     for (let k = 0; k < xs.length; k++) {
       const y = ys[k];
       if (!Number.isFinite(y)) { on = false; continue; }
       const inside = Math.min(Math.max(y, low - reach), high + reach);
-      d += `${on ? "L" : "M"}${toX(xs[k]).toFixed(1)},${toY(inside, curve.axis).toFixed(1)}`;
+      d += `${on ? "L" : "M"}${toX(xs[k]).toFixed(1)},${toY(inside, axis).toFixed(1)}`;
       on = true;
     }
-    const zero = toY(0, curve.axis).toFixed(1);
+    const zero = toY(0, axis).toFixed(1);
     const [first, last] = [xs[0], xs[xs.length - 1]].map((x) => `${toX(x).toFixed(1)},${zero}`);
-    const filled = curve.fill && d ? `<path class="filled is-${curve.role}" d="${d}L${last}L${first}Z"/>`
+    const filled = curve.fill && d ? `<path class="filled is-${role}" d="${d}L${last}L${first}Z"/>`
       : "";
-    const look = `${curve.width ? ` stroke-width="${curve.width}"` : ""}${
-      curve.dash ? ` stroke-dasharray="${curve.dash}"` : ""}`;
-    return `${filled}<path class="curve is-${curve.role}" d="${d}"${look}/>`;
+    return `${filled}<path class="curve is-${role}" d="${d}"${curve.width ? ` stroke-width="${curve.width}"`
+      : ""}${dashed(curve)}/>`;
   }
 
   function stems(curve) {
-    const low = spec[curve.axis].range[0], base = toY(Math.max(0, low), curve.axis);
+    const axis = axisOf(curve.role), base = toY(Math.max(0, spec[axis].range[0]), axis);
     let d = "", heads = "";
     for (let k = 0; k < curve.x.length; k++) {
-      const x = toX(curve.x[k]) + (curve.offset ?? 0), y = toY(curve.y[k], curve.axis);
+      const x = toX(curve.x[k]) + (curve.offset ?? 0), y = toY(curve.y[k], axis);
       if (y > base - 0.5) continue;
       d += `M${x.toFixed(1)},${base.toFixed(1)}V${y.toFixed(1)}`;
-      heads += curve.head === "square"
+      heads += curve.role === "kernel"
         ? `<rect x="${(x - 2).toFixed(1)}" y="${(y - 2).toFixed(1)}" width="4" height="4"/>`
         : `<circle cx="${x.toFixed(1)}" cy="${y.toFixed(1)}" r="2.3"/>`;
     }
@@ -170,22 +166,23 @@ export function createPlot(host, { announce }) {
       if (x > size[0]) return "";
       const sign = curve.stems ? `<g class="stems is-${curve.role}"><path d="M${at + 5},11V4"/><circle cx="${
         at + 5}" cy="4" r="2.2"/></g>` : `<path class="curve is-${curve.role}" d="M${at},7h11"${
-        curve.dash ? ` stroke-dasharray="${curve.dash}"` : ""}/>`;
+        dashed(curve)}/>`;
       return `${sign}<text x="${at + 14}" y="11">${escaped(curve.name)}</text>`;
     }).join("");
   }
 
   /** Names above their lines. A name that would cross another line or name is left out. */
   function names(x0, x1) {
-    const boxes = [], stems = spec.curves.filter((curve) => curve.stems).flatMap((curve) => (
-      curve.x.map((x, k) => ({ x, at: toX(x) + (curve.offset ?? 0), top: toY(curve.y[k], curve.axis) }))));
-    return (spec.names ?? []).map(({ x, y, axis, text }) => {
+    const boxes = [], stems = spec.curves.filter((curve) => curve.stems).flatMap(
+      ({ x: xs, y, role, offset = 0 }) => xs.map(
+        (x, k) => ({ x, at: toX(x) + offset, top: toY(y[k], axisOf(role)) })));
+    return (spec.names ?? []).map(({ x, y, text }) => {
       const width = 6.2 * text.replace(/_/g, "").length, [low, high] = spec.x.range;
       if (x < low || x > high) return "";
       const at = Math.min(Math.max(toX(x), x0 + width / 2), x1 - width / 2);
       const own = stems.filter((stem) => Math.abs(stem.x - x) < 1e-3);
       const others = stems.filter((stem) => !own.includes(stem));
-      let up = Math.max(Math.min(toY(y, axis), ...own.map(({ top }) => top)) - 6, TOP + 2);
+      let up = Math.max(Math.min(toY(y, axisOf("")), ...own.map(({ top }) => top)) - 6, TOP + 2);
       const hits = () => boxes.some((box) => Math.abs(box.at - at) < (box.width + width) / 2
         && Math.abs(box.up - up) < NAME_HEIGHT)
         || others.some((stem) => Math.abs(stem.at - at) < width / 2 && stem.top < up + 4);
@@ -203,14 +200,12 @@ export function createPlot(host, { announce }) {
     if (cursor !== null && cursor >= spec.x.range[0] && cursor <= spec.x.range[1]) {
       parts.push(`<path class="cursor" d="M${toX(cursor).toFixed(1)},${y0}V${y1}"/>`);
     }
-    if (selected >= 0) {
-      const { x, text } = readings()[selected] ?? {};
-      if (text) {
-        const at = toX(x), end = at > (x0 + x1) / 2;
-        parts.push(`<path class="reading" d="M${at.toFixed(1)},${y0}V${y1}"/>`, `<text class="read" x="${
-          (at + (end ? -5 : 5)).toFixed(1)}" y="${y0 + 10}" text-anchor="${end ? "end" : "start"}">${
-          escaped(text)}</text>`);
-      }
+    const { x, text } = (selected >= 0 && readings()[selected]) || {};
+    if (text) {
+      const at = toX(x), isRight = at > (x0 + x1) / 2;
+      parts.push(`<path class="reading" d="M${at.toFixed(1)},${y0}V${y1}"/>`, `<text class="read" x="${
+        (at + (isRight ? -5 : 5)).toFixed(1)}" y="${y0 + 10}" text-anchor="${isRight ? "end" : "start"}">${
+        escaped(text)}</text>`);
     }
     over.innerHTML = parts.join("");
   }
@@ -241,15 +236,13 @@ export function createPlot(host, { announce }) {
     selected = index >= 0 && Math.abs(toX(all[index].x) - place(event)) < READING_DISTANCE ? index : -1;
     drawMarks();
   });
-  for (const name of ["pointerleave", "blur"]) {
-    svg.addEventListener(name, () => { selected = -1; if (spec) drawMarks(); });
-  }
+  const leave = () => { selected = -1; if (spec) drawMarks(); };
+  for (const name of ["pointerleave", "blur"]) svg.addEventListener(name, leave);
   svg.addEventListener("keydown", (event) => {
     const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     if (!spec || !way || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    const all = readings();
-    const next = selected + way * Math.max(1, Math.round(all.length / 100));
+    const all = readings(), next = selected + way * Math.max(1, Math.round(all.length / 100));
     selected = Math.min(Math.max(next, 0), all.length - 1);
     announce(all[selected]?.text ?? "There are no values to read.");
     drawMarks();
