@@ -58,7 +58,7 @@ export function buildControls(host, { editable, current, change, refuse, hold, e
     input.parentNode.querySelector(".unit").textContent = unit;
   }
   for (const select of all("select[data-key]")) {
-    select.innerHTML = options(CHOICES[select.dataset.key], (value) => WORDS[value] ?? value);
+    select.innerHTML = options(CHOICES[select.dataset.key].options, (value) => WORDS[value] ?? value);
   }
   for (const part of all(editable ? "[data-file]" : "[data-served]")) part.remove();
 

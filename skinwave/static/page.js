@@ -133,7 +133,8 @@ function show({ values, past, bodies, answer, pinned, measured, errors, notice, 
     const drive = answer.values.drive.replaceAll("_", " ");
     $("commanded-note").textContent = `${drive}, ${rounded(load.duration)} s`;
   });
-  const options = { pinned, measured, highest: parseFloat(highest), log: highest.endsWith("log"), scale: fit };
+  const options = { pinned, measured, highest: parseFloat(highest), log: highest.endsWith("log"),
+    scale: fit };
   const room = Object.values(answer.peaks ?? {}).map(niceTop).join();
   part("plots", [kernel, span, highest, pinned, measured, answer.invalid, room], () => {
     plots.waveform.draw(waveformPlot(answer, spanOf(span, load), options));
@@ -324,7 +325,8 @@ function step(way) {
 
 function applyPreset({ title, values: own }) {
   const known = Object.entries(own).filter(([key]) => key in STARTS);
-  setValues({ ...state.values, ...Object.fromEntries(known.map(([key, value]) => [key, check(key, value)])) });
+  const checked = Object.fromEntries(known.map(([key, value]) => [key, check(key, value)]));
+  setValues({ ...state.values, ...checked });
   update({ notice: title });
 }
 

@@ -26,64 +26,62 @@ export const NUMBERS = {
 
 const RATIOS = { "1:0": 1, "0.75:0.25": 0.75, "0.5:0.5": 0.5, "0.25:0.75": 0.25, "0:1": 0 };
 const SHAPES = ["point", "line", "circle", "triangle", "square"]; // shapes that have a size
+
+/** Choices of words. */
 export const CHOICES = {
-  ratio: Object.keys(RATIOS),
-  shape: [...SHAPES, "polyline"],
-  sweep: ["there_and_back", "one_way", "sinusoidal"],
-  drive: ["linear", "pressure_squared", "force_corrected"],
-  profile: ["gaussian", "main_lobe"],
-  sharing: ["simultaneous", "time_multiplexed"],
-  quantity: ["displacement", "velocity", "acceleration"],
-  body: [], // filled by nameBodies
-};
-
-export const STARTS = {
-  ...Object.fromEntries(Object.entries(NUMBERS).map(([key, number]) => [key, number.start])),
-  ratio: "1:0", shape: "circle", sweep: "there_and_back", drive: "pressure_squared",
-  profile: "gaussian", body: "skin-slab", sharing: "simultaneous", quantity: "displacement",
-  pulses: "", phases: "", paths: "", polyline: "",
-};
-
-export const LABELS = {
-  ...Object.fromEntries(Object.entries(NUMBERS).map(([key, number]) => [key, number.label])),
-  ratio: "Superposition ratio", shape: "Shape of the path", sweep: "Sweep of a line", drive: "Drive law",
-  profile: "Focus profile", body: "Body", sharing: "Several foci", quantity: "Quantity at the point",
-  pulses: "Rhythm, ms", phases: "Phases, %", paths: "Paths of the foci", polyline: "Points of the path, mm",
+  ratio: { label: "Superposition ratio", start: "1:0", options: Object.keys(RATIOS) },
+  shape: { label: "Shape of the path", start: "circle", options: [...SHAPES, "polyline"] },
+  sweep: { label: "Sweep of a line", start: "there_and_back",
+    options: ["there_and_back", "one_way", "sinusoidal"] },
+  drive: { label: "Drive law", start: "pressure_squared",
+    options: ["linear", "pressure_squared", "force_corrected"] },
+  profile: { label: "Focus profile", start: "gaussian", options: ["gaussian", "main_lobe"] },
+  body: { label: "Body", start: "skin-slab", options: [] }, // filled by nameBodies
+  sharing: { label: "Several foci", start: "simultaneous", options: ["simultaneous", "time_multiplexed"] },
+  quantity: { label: "Quantity at the point", start: "displacement",
+    options: ["displacement", "velocity", "acceleration"] },
 };
 
 const AREA = 50; // mm: half the side of the area of paths
 const LARGEST_SIZE = 60; // mm, the size of a palm
-const HIGHEST_FD = 20000; // Hz, half the carrier
 // mm: centres of the paths of further foci
 const CENTRES = [[-20, 0], [20, 0], [0, 20], [0, -20], [-20, 20], [20, -20], [20, 20], [-20, -20]];
-const ROOT3 = Math.sqrt(3);
+
+/**
+ * Texts of at most `most` rows. A row has one of some `words`, if there are any, and `count` numbers, all
+ * between slashes. `like` describes a row.
+ */
+const TEXTS = {
+  pulses: { label: "Rhythm, ms", count: 2, most: 64,
+    like: "on/off times in ms, with on above 0, such as 100/50", isValid: ([on, gap]) => on > 0 && gap >= 0 },
+  phases: { label: "Phases, %", count: 1, most: NUMBERS.foci.high,
+    like: "phases from 0 to below 100 %, such as 0, 25, 60",
+    isValid: ([phase]) => phase >= 0 && phase < 100 },
+  paths: { label: "Paths of the foci", count: 3, words: SHAPES, most: NUMBERS.foci.high,
+    like: `shape/size/x/y in mm, such as circle/20/-15/0. Shapes: ${SHAPES.join(", ")}; size up to ${
+      LARGEST_SIZE} mm; all within ±${AREA} mm`,
+    isValid: ([shape, size, ...at]) => size >= 0 && size <= LARGEST_SIZE && extentOf(shape, size)
+      .every((extent, axis) => Math.abs(at[axis]) + extent <= AREA * (1 + 1e-9)) },
+  polyline: { label: "Points of the path, mm", count: 2, most: 400,
+    like: `corners x/y within ±${AREA} mm, such as 10/5`,
+    isValid: (at) => Math.max(...at.map(Math.abs)) <= AREA },
+};
+
+const ofControls = (valueOf) => Object.fromEntries(
+  Object.entries({ ...NUMBERS, ...CHOICES, ...TEXTS }).map(([key, control]) => [key, valueOf(control)]));
+export const STARTS = ofControls(({ start = "" }) => start);
+export const LABELS = ofControls(({ label }) => label);
 
 /** Set the names of the bodies. */
 export function nameBodies(names) {
-  CHOICES.body = [...names];
+  CHOICES.body.options = [...names];
 }
 
 const parts = (text) => text.split(",").map((part) => part.trim()).filter(Boolean);
 const toNumber = (text) => (/^[^\s]+$/.test(text.trim()) ? Number(text) : NaN);
 const inUnit = (value, unit) => (unit ? `${value} ${unit}` : `${value}`);
+const refuseIf = (isWrong, sentence) => { if (isWrong) throw new Error(sentence); };
 const short = (text) => (text.length > 40 ? `${text.slice(0, 37)}...` : text);
-
-/**
- * Controls with a text of at most `most` rows. A row has one of some `words`, if there are any, and `count`
- * numbers, all between slashes. `like` describes a row.
- */
-const TEXTS = {
-  pulses: { count: 2, most: 64, like: "on/off times in ms, with on above 0, such as 100/50",
-    isValid: ([on, gap]) => on > 0 && gap >= 0 },
-  phases: { count: 1, most: NUMBERS.foci.high, like: "phases from 0 to below 100 %, such as 0, 25, 60",
-    isValid: ([phase]) => phase >= 0 && phase < 100 },
-  polyline: { count: 2, most: 400, like: `corners x/y within ±${AREA} mm, such as 10/5`,
-    isValid: (at) => Math.max(...at.map(Math.abs)) <= AREA },
-  paths: { count: 3, words: SHAPES, most: NUMBERS.foci.high, like: "shape/size/x/y in mm, such as "
-    + `circle/20/-15/0. Shapes: ${SHAPES.join(", ")}; size up to ${LARGEST_SIZE} mm; all within ±${AREA} mm`,
-  isValid: ([shape, size, ...at]) => size >= 0 && size <= LARGEST_SIZE && extentOf(shape, size)
-    .every((extent, axis) => Math.abs(at[axis]) + extent <= AREA * (1 + 1e-9)) },
-};
 
 /** Rows [[...]] of the text of a control, in its units. Throws an Error with a sentence for users. */
 export function rowsOf(key, text) {
@@ -92,11 +90,12 @@ export function rowsOf(key, text) {
     const cells = part.split("/"), word = words ? [cells.shift().trim()] : [];
     const row = [...word, ...cells.map(toNumber)];
     const isKnown = cells.length === count && row.slice(word.length).every(Number.isFinite);
-    if (isKnown && (!words || words.includes(row[0])) && isValid(row)) return row;
-    throw new Error(`${LABELS[key]}: "${short(part)}" is not valid. Give ${like}.`);
+    refuseIf(!isKnown || (words && !words.includes(row[0])) || !isValid(row),
+      `${LABELS[key]}: "${short(part)}" is not valid. Give ${like}.`);
+    return row;
   });
-  if (rows.length <= most) return rows;
-  throw new Error(`${LABELS[key]}: ${rows.length} entries are too many. Give at most ${most}.`);
+  refuseIf(rows.length > most, `${LABELS[key]}: ${rows.length} entries are too many. Give at most ${most}.`);
+  return rows;
 }
 
 /** Pulses and gaps [[on, gap]] in s, from a text such as "100/50, 40/110" in ms. */
@@ -104,7 +103,7 @@ export const pulsesOf = (text) => rowsOf("pulses", text).map((pulse) => pulse.ma
 
 /** Half extent [x, y] of a shape around its centre, in the unit of its size. */
 function extentOf(shape, size) {
-  return { point: [0, 0], line: [size / 2, 0], triangle: [size / 2, size / ROOT3] }[shape]
+  return { point: [0, 0], line: [size / 2, 0], triangle: [size / 2, size / Math.sqrt(3)] }[shape]
     || [size / 2, size / 2];
 }
 
@@ -134,24 +133,24 @@ export function withCorner(values, k, at) {
  * not a number or out of range.
  */
 export function check(key, text) {
-  if (!(key in STARTS)) throw new Error(`"${short(key)}" is not a control of this page.`);
+  refuseIf(!(key in STARTS), `"${short(key)}" is not a control of this page.`);
   const given = String(text).trim(), label = LABELS[key];
   if (key in TEXTS) {
     rowsOf(key, given);
     return given;
   }
   if (key in CHOICES) {
-    if (CHOICES[key].length && !CHOICES[key].includes(given)) {
-      throw new Error(`${label}: "${short(given)}" is not available. Choose ${CHOICES[key].join(", ")}.`);
-    }
+    const { options } = CHOICES[key];
+    refuseIf(options.length && !options.includes(given),
+      `${label}: "${short(given)}" is not available. Choose ${options.join(", ")}.`);
     return given;
   }
   const { unit, low, high, least = low } = NUMBERS[key], value = toNumber(given.replace(",", "."));
   const problem = !Number.isFinite(value) ? `"${short(given)}" is not a number`
     : value < least || value > high ? `${inUnit(short(given), unit)} is out of range`
       : key === "foci" && !Number.isInteger(value) ? `${value} is not a whole number` : "";
-  if (!problem) return value;
-  throw new Error(`${label}: ${problem}. Give a value from ${least} to ${inUnit(high, unit)}.`);
+  refuseIf(problem, `${label}: ${problem}. Give a value from ${least} to ${inUnit(high, unit)}.`);
+  return value;
 }
 
 /** Text of a value of a control, with its unit. */
@@ -178,10 +177,8 @@ const evenly = (n) => Array.from({ length: n }, (_, k) => k / n);
 /** Path and phases of the foci {path, foci} of a load. */
 function pathAndFoci(values) {
   const n = values.foci, own = pathsOf(values.paths);
-  const expectOneEach = (rows, title, words) => {
-    if (!rows.length || rows.length === n) return;
-    throw new Error(`${title}: there are ${rows.length} ${words} and ${n} foci. Give one for each focus.`);
-  };
+  const expectOneEach = ({ length }, title, words) => refuseIf(length && length !== n,
+    `${title}: there are ${length} ${words} and ${n} foci. Give one for each focus.`);
   expectOneEach(own, "Own paths", "paths");
   if (own.length) return { path: { shape: "joined", paths: own, drawn: values.drawn }, foci: evenly(n) };
   const phases = rowsOf("phases", values.phases).map(([phase]) => phase / 100), { shape, sweep } = values;
@@ -190,7 +187,7 @@ function pathAndFoci(values) {
   if (SHAPES.includes(shape) && shape !== "point") path.size = values.size / 1e3;
   if (shape === "polyline") {
     path.points = rowsOf("polyline", values.polyline).map(([x, y]) => [x / 1e3, y / 1e3]);
-    if (path.points.length < 2) throw new Error("A polyline needs two corners or more, such as 0/0, 10/0.");
+    refuseIf(path.points.length < 2, "A polyline needs two corners or more, such as 0/0, 10/0.");
   }
   return { path, foci: phases.length ? phases : evenly(n) };
 }
@@ -211,15 +208,11 @@ function pathExtent(path) {
 export function loadOf(values, body = null) {
   const { path, foci } = pathAndFoci(values), pulses = pulsesOf(values.pulses), ramp = values.ramp / 1e3;
   const fd = drawingFrequency(path);
-  if (fd > HIGHEST_FD) {
-    throw new Error(`The drawing frequency is ${Math.round(fd)} Hz; the limit is ${HIGHEST_FD} Hz, half the `
-      + "carrier. Use a longer path or a lower speed.");
-  }
+  refuseIf(fd > 20000, `The drawing frequency is ${Math.round(fd)} Hz; the limit is 20000 Hz, half the `
+    + "carrier. Use a longer path or a lower speed.");
   const shortest = Math.min(...pulses.map(([on]) => on));
-  if (pulses.length && ramp > shortest / 2) {
-    throw new Error(`Ramp: ${values.ramp} ms is longer than half the shortest pulse of `
-      + `${Number((1e3 * shortest).toPrecision(6))} ms. Give a shorter ramp.`);
-  }
+  refuseIf(ramp > shortest / 2, `Ramp: ${values.ramp} ms is longer than half the shortest pulse of ${
+    Number((1e3 * shortest).toPrecision(6))} ms. Give a shorter ramp.`);
   if (body) checkOnBody(path, values, body);
   return {
     path, foci, am: values.am, am2: values.am2, envelope: values.envelope, w1: RATIOS[values.ratio],
@@ -230,21 +223,14 @@ export function loadOf(values, body = null) {
 }
 
 function checkOnBody(path, values, body) {
-  if (values.height < (body.lowest_height_mm || 0)) {
-    throw new Error(`Height of the focus: ${values.height} mm is too low for ${body.title}. Give at least ${
-      body.lowest_height_mm} mm.`);
-  }
+  refuseIf(values.height < body.lowest_height_mm, `Height of the focus: ${values.height} mm is too low for ${
+    body.title}. Give at least ${body.lowest_height_mm} mm.`);
   if (!body.extent_mm) return;
-  const reach = pathExtent(path);
-  for (const axis of [0, 1]) {
-    const half = body.extent_mm[axis], name = "xy"[axis];
-    if (1e3 * reach[axis] > half * (1 + 1e-9)) {
-      const furthest = Number((1e3 * reach[axis]).toPrecision(3));
-      throw new Error(`The path reaches ${name} = ${furthest} mm, off the body, which ends at ±${half} mm. `
-        + "Make the path smaller.");
-    }
-    if (Math.abs(values[name]) > half) {
-      throw new Error(`Point: ${name} = ${values[name]} mm is off the body, which ends at ±${half} mm.`);
-    }
-  }
+  pathExtent(path).forEach((reach, axis) => {
+    const half = body.extent_mm[axis], name = "xy"[axis], furthest = Number((1e3 * reach).toPrecision(3));
+    const end = `off the body, which ends at ±${half} mm`;
+    refuseIf(1e3 * reach > half * (1 + 1e-9),
+      `The path reaches ${name} = ${furthest} mm, ${end}. Make the path smaller.`);
+    refuseIf(Math.abs(values[name]) > half, `Point: ${name} = ${values[name]} mm is ${end}. Move the point.`);
+  });
 }
