@@ -11,7 +11,7 @@ from skinwave.scene.scene import BODIES
 
 USED = {
     "bodies": "openBody", "maps": "contours drawMap mapControls",
-    "files": "linesCsv readMeasurement sceneToml waveformCsv waveformWav", "kernel": "respond",
+    "files": "linesCsv readMeasurement sceneToml waveformCsv waveformWav", "kernel": "kernelMotion",
     "load": "loadLines spot", "evaluate": "MAP_LINE amplitudesOf delayOf levelOf levelOver mapOf "
     "namesOf phaseDelay pressureThresholdAt reach shareOutside spectrum thresholdAt",
     "address": "fromAddress toAddress", "radial": "besselJ0", "values": "STARTS check loadOf",

@@ -3,9 +3,9 @@
     (diag(squared) + c(w) B + i w diag(damping) - w^2) q = F
 
 where B is the stiffness of bending between the modes and c its complex modulus over that of the
-modes, minus 1; air and edges damp each mode as at its own frequency. The fields of the modes are
-given on a square grid. The force of a focal spot on a mode is the field of the mode, smoothed by
-the spot.
+modes, minus 1. Air and edges damp each mode as they do at its own frequency. The fields of the
+modes are given on a square grid. The force of a focal spot on a mode is the field of the mode,
+smoothed by the spot.
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 
 import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapOf, namesOf, peakAt, reach,
   shareOutside } from "./evaluate.js";
-import { respond as respondOfKernel } from "./kernel.js";
+import { kernelMotion } from "./kernel.js";
 import { pathSamples, spotWidth } from "./load.js";
 import { loadOf } from "./values.js";
 
@@ -15,14 +15,14 @@ const TOLERANCE = 0.05; // of the error of a sheet's lines by its stretching
  */
 export function respond(values, body) {
   const load = loadOf(values, body), x = values.x / 1e3, y = values.y / 1e3;
-  const kernel = respondOfKernel(load), waves = body.motion(load);
+  const kernel = kernelMotion(load), waves = body.motion(load);
   const [kernelAt, wavesAt] = [kernel.at(x, y), waves.at(x, y)];
   return { values, body, load, x, y, kernel, waves, kernelAt, wavesAt,
     level: body.is_skin ? levelOf(waves.f, wavesAt, "m") : null,
     kernelLevel: levelOf(kernel.f, kernelAt, "Pa") };
 }
 
-/** Typeset name of the line at a frequency in Hz, such as "2 f_d − f_AM"; "" if it is unknown. */
+/** Typeset name of the line at a frequency in Hz, such as "2 f_d − f_AM", or "" if it is unknown. */
 export function lineName(answer, f) {
   answer.names ??= namesOf(answer.load);
   return typeset(answer.names(f));
@@ -31,13 +31,10 @@ export function lineName(answer, f) {
 export const typeset = (name) => name.replace(/-/g, " − ").replace(/\+/g, " + ")
   .replace(/(\d)(?=f)/g, "$1 ").replace(/^ − /, "−");
 
-/** Keys of the result of `mapsOf`. */
-export const NUMBERS_OF_MAPS = ["maps", "peaks", "share", "kernelShare", "reach", "kernelReach", "delay",
-  "invalid", "stretching", "warnings"];
-
 /**
- * Maps of the kernel and the waves, and the numbers that need them. `peaks` are the largest values of both at
- * the place where each is strongest, in Pa and in SI units of the quantity.
+ * Maps of the kernel and the waves, and the numbers that need them: a record that completes the answer.
+ * `peaks` are the largest values of both, in Pa and in SI units of the quantity, at the place where each is
+ * strongest.
  */
 export function mapsOf(answer) {
   const { kernel, waves, load, body } = answer;
@@ -55,8 +52,8 @@ export function mapsOf(answer) {
 }
 
 /**
- * Error of a sheet's lines by its stretching, which this page leaves out, and the reason why a result is
- * `invalid`, "" if it is valid: {stretching, invalid}.
+ * Validity {stretching, invalid} of an answer. `stretching` is the error of a sheet's lines by its stretching,
+ * which this page leaves out. `invalid` is the reason why the result is not valid, or "".
  */
 function validity({ body, waves, x, y }) {
   if (!body.thickness_mm) return { stretching: 0, invalid: "" };
@@ -67,8 +64,8 @@ function validity({ body, waves, x, y }) {
       invalid: ratio > LARGE_DEFLECTION ? `linear model, ${ratio.toPrecision(2)} × thickness` : "" };
   }
   const stretching = body.stretchingOf(waves);
-  // Large errors are known to be large only: resonances that stretching shifts have no bound here.
-  const invalid = stretching > TOLERANCE ? `stretching is left out: error above ${100 * TOLERANCE} %` : "";
+  // A large error has no bound, because stretching shifts resonances.
+  const invalid = stretching > TOLERANCE ? `no stretching: error above ${100 * TOLERANCE} %` : "";
   return { stretching, invalid };
 }
 

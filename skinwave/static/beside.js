@@ -4,8 +4,8 @@ import { mapsOf } from "./answer.js";
 
 /**
  * Function `(answer, record)` that computes the maps of an answer in a worker and gives them to
- * `take(maps, answer)`; of several answers while the worker is busy, the last. `program` is the text of the
- * worker. Where a browser allows no worker, the maps are computed at once.
+ * `take(maps, answer)`. While the worker is busy, only the last answer waits. `program` is the text of the
+ * worker. If a browser allows no worker, the maps are computed at once.
  */
 export function mapsBeside(program, take) {
   const sent = new Map(); // records by name

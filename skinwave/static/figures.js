@@ -82,8 +82,8 @@ function nameOfA(factor) {
 }
 
 /**
- * Plot of the waveforms. `scale(name, largest)` gives the top of an axis, which has room for the largest
- * value at the place where kernel or waves are strongest, so that what is silent is drawn so.
+ * Plot of the waveforms. `scale(name, largest)` gives the top of an axis. An axis has room for the largest
+ * value where the kernel or the waves are strongest, so that a silent one is drawn as a flat line.
  */
 export function waveformPlot(answer, span, { pinned, measured, scale }) {
   const { kernel, waves, values, x, y } = answer, quantity = QUANTITIES[values.quantity];

@@ -67,10 +67,10 @@ export function readScene(text, name, bodies) {
     if (!key) continue;
     try { given[table + key] = JSON.parse(value); } catch { given[table + key] = value; }
   }
-  if (given.name !== NAME) refuse("it is no scene that this page has saved.");
+  if (given.name !== NAME) refuse("The file is not a scene from Save.");
   const lists = ["tacton.superposition", "tacton.foci", "probes.points_mm"];
-  if (!lists.every((key) => Array.isArray(given[key]))) refuse("it is incomplete.");
-  if (given["tacton.shape"] === "recorded") refuse("own paths are kept in a session only.");
+  if (!lists.every((key) => Array.isArray(given[key]))) refuse("The scene is incomplete.");
+  if (given["tacton.shape"] === "recorded") refuse("Own paths are kept in a session only.");
   for (const [name, keys] of Object.entries(KEYS)) {
     for (const [key, control] of Object.entries(keys)) {
       const value = given[`${name}.${key}`];
@@ -88,7 +88,7 @@ export function readScene(text, name, bodies) {
   };
   for (const [key, own] of Object.entries(set)) values[key] = check(key, own);
   const own = bodies.find((body) => text.includes(body.toml.trim()));
-  return { ...values, body: (own ?? refuse("its body is not one of this page.")).name };
+  return { ...values, body: (own ?? refuse("The body of the scene is not on this page.")).name };
 }
 
 const timesOf = ({ duration }) => Float64Array.from({ length: Math.max(2, Math.round(duration * RATE)) },
@@ -145,7 +145,7 @@ export function readSession(text, name) {
   let found = {};
   try { found = JSON.parse(text); } catch { /* not JSON */ }
   if (found?.format !== SESSION) {
-    throw new Error(`${name} is no session of this page. Choose a file from Save.`);
+    throw new Error(`${name} is not a session of this page. Choose a file from Save.`);
   }
   const checked = (own) => ({ ...STARTS, ...Object.fromEntries(
     Object.entries(own).map(([key, value]) => [key, check(key, value)])) });

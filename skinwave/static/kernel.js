@@ -8,7 +8,7 @@ const NEGLIGIBLE = 5.7; // widths of a Gaussian spot, beyond which it is below 1
 const ROUND_OFF = 1e-9; // of the peak pressure: weaker lines at a point are 0
 
 /** Motion of the point kernel under a load, with the interface of a body's, in Pa in place of metre. */
-export function respond(load) {
+export function kernelMotion(load) {
   const { f, w, samples } = loadLines(load);
   const reach = load.profile === "gaussian" ? NEGLIGIBLE * spotWidth(load.height) : Infinity;
   const onGrid = (xs, ys) => {

@@ -1,7 +1,7 @@
 // The page: events change its state, and `show` draws the state.
 
 import { addressOf, readAddress, withStep } from "./address.js";
-import { NUMBERS_OF_MAPS, mapsOf, respond as respondTo } from "./answer.js";
+import { mapsOf, respond as respondTo } from "./answer.js";
 import { mapsBeside } from "./beside.js";
 import { openBody, shapeOf, surfaceMotion } from "./bodies.js";
 import { afterPause, buildControls } from "./controls.js";
@@ -65,10 +65,10 @@ const isBusy = ({ values, tried, answer, errors }) => values !== tried
 /** Answer to the values, with the numbers of the last maps of the same body until there are new ones. */
 function computed({ values, tried, answer, errors }) {
   if (values === tried) return {};
-  const { load, ...others } = errors, isSame = answer?.body === bodyOf(values.body);
-  const known = isSame ? NUMBERS_OF_MAPS.map((key) => [key, answer[key]]) : [];
+  const { load, ...others } = errors;
+  const completed = answer?.body === bodyOf(values.body) ? answer.completed : null;
   try {
-    return { tried: values, answer: { ...Object.fromEntries(known), ...respond(values) }, errors: others };
+    return { tried: values, answer: { completed, ...completed, ...respond(values) }, errors: others };
   } catch (error) {
     return { tried: values, errors: { ...others, load: error.message } };
   }
@@ -104,11 +104,12 @@ const views = {}, flat = shapeOf({});
 const askForMaps = mapsBeside($("worker").textContent, (maps, { body, values }) => {
   const { answer, clock } = state;
   if (body === answer.body) {
-    update({ answer: { ...answer, ...maps, mapped: values }, clock: clock % playedOf(answer.load) });
+    const whole = { ...answer, completed: maps, ...maps, mapped: values };
+    update({ answer: whole, clock: clock % playedOf(answer.load) });
   }
 });
 
-/** Draw a part of the page if its inputs have changed; returns whether they have. */
+/** Draw a part of the page if its inputs have changed. Returns whether they have. */
 function part(name, inputs, draw) {
   if (shown.get(name)?.every((value, k) => value === inputs[k])) return false;
   shown.set(name, inputs);

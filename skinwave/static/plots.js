@@ -62,8 +62,8 @@ const subscripted = (name) => escaped(name).replace(/_(\w+)/g,
  * important first. If there are two axes, only the kernel is on the first one.
  */
 export function createPlot(host, { announce }) {
-  host.innerHTML = `<svg tabindex="0" role="img" aria-label="Plot, not yet drawn" class="plot"><g></g><g></g>
-    </svg>`;
+  host.innerHTML = '<svg tabindex="0" role="img" aria-label="Plot, not yet drawn" class="plot">'
+    + "<g></g><g></g></svg>";
   const svg = host.firstElementChild, [picture, over] = svg.children, clip = `clip-${host.id}`;
   let spec = null, size = [0, 0], cursor = null, selected = -1;
 

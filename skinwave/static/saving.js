@@ -25,8 +25,8 @@ function standalone(svg, x, y) {
 }
 
 /**
- * SVG {text, width, height} of elements of the page in their places: SVG, a canvas with `asSvg`, or the text
- * of others.
+ * SVG {text, width, height} of elements of the page in their places. SVG elements are copied, a canvas gives
+ * its `asSvg()`, and other elements their text.
  */
 function figureOf(parts, paper, title) {
   const visible = parts.filter((part) => part.getClientRects().length);

@@ -33,7 +33,7 @@ TIMES = np.arange(301) * 1e-4
 JUMPS = 5e-5  # relative error of lines of joined paths and of paths that jump
 WRONG = {"am": "high", "height": "90", "foci": "2.5", "pulses": "100", "paths": "circle/20/45/0"}
 ANSWER = """(own) => { const load = loadOf(own), x = own.x / 1e3, y = own.y / 1e3;
-  const motion = respond(load), at = motion.at(x, y);
+  const motion = kernelMotion(load), at = motion.at(x, y);
   return { values: own, load, x, y, body: { is_skin: true }, kernel: motion, kernelAt: at,
     waves: motion, wavesAt: at }; }"""
 REFUSED = (
@@ -115,8 +115,8 @@ def test_the_kernel_in_time_and_on_a_map(page, starts):
     many = some_values(starts, 20, rhythm=True)
     found = page.evaluate(
         """([many, times]) => many.map((own) => {
-          const known = loadOf(own), motion = respond(known);
-          const paper = respond({ ...known, drive: "linear", profile: "main_lobe" });
+          const known = loadOf(own), motion = kernelMotion(known);
+          const paper = kernelMotion({ ...known, drive: "linear", profile: "main_lobe" });
           const [map, other] = [motion, paper].map((each) => mapOf(each));
           return { f: [...motion.f], map: [...map.rms], other: [...other.rms],
             levels: [...map.level],
@@ -210,7 +210,7 @@ def test_the_highest_level_over_a_control_is_refined(page, starts):
           const levelsAt = (size) => {
             if (size > 50) throw new Error("off the body");
             const known = loadOf({ ...own, size });
-            const motion = respond(known);
+            const motion = kernelMotion(known);
             const level = levelOf(motion.f, motion.at(0.01, 0), "Pa");
             return { kernel: level?.dB ?? NaN, waves: NaN };
           };

@@ -247,7 +247,10 @@ def test_waves_move_beside_a_kernel_that_is_silent_outside(opened):
     before = tab.evaluate(pixels)
     tab.wait_for_function(f"(before) => ({pixels})()[1] !== before[1]", arg=before)
     assert tab.evaluate(pixels)[0] == before[0]
-    tab.click("#play")
+    tab.click("[popovertarget=save]")
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name="Maps and plots, SVG").click()
+    assert saved.value.path().read_text(encoding="utf-8").count("<image") == 4  # maps and bars
     assert tab.locator("#wave-map image").count() == 2  # the map, in the picture that is saved
     assert "1 s shows 12 ms" in tab.inner_text("#phase-text")
     assert [said for said in tab.messages[1:] if "readback" not in said] == []
