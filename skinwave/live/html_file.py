@@ -23,15 +23,12 @@ from skinwave.system.scripts import bundle, digest, json_for_script
 from skinwave.system.templates import render
 
 
-def page(
-    data: Mapping[str, Any],
-    title: str = "skinwave: waves in skin and paper under mid-air ultrasound haptics",
-) -> str:
+def page(data: Mapping[str, Any]) -> str:
     """Return the live page as HTML, with data from `data_of`."""
     static = resources.files("skinwave") / "static"
     script = "\n" + bundle(static, "page.js")
     return render(
-        "live.html", title=title, script=script, worker=bundle(static, "worker.js"),
+        "live.html", script=script, worker=bundle(static, "worker.js"),
         css=(static / "page.css").read_text(encoding="utf-8"),
         data=json_for_script(data), policy=policy(script, served=bool(data.get("api"))),
         failed=failure_text(data.get("failures", {})), measured=suffixes(MEASUREMENTS),

@@ -22,16 +22,13 @@ from skinwave.live.packs import pack_method
 from skinwave.live.values import control_values
 from skinwave.models.meshed import mesh_body
 from skinwave.models.options import SolveOptions
-from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
-from skinwave.models.reduced import answer, components, reduce_scene
-from skinwave.planning.simulate import compute
+from skinwave.models.reduced import components, reduce_scene
 from skinwave.scene.scene import STILL, Body, Scene
 from skinwave.system.effort import Clock, silent
 from skinwave.typing import Complex, Floats
 
 Lines = Callable[[Scene], tuple[Floats, Complex]]
-Waveform = Callable[[Scene], Floats]
 Places = tuple[tuple[float, float], ...]
 
 
@@ -64,7 +61,7 @@ def selftest(
     """
     rng = np.random.default_rng(seed)
     records: list[dict[str, Any]] = []
-    lines_of, _, places = exact(body)
+    lines_of, places = exact_lines(body)
     limits = OF_ELEMENTS if places else Compared()
     while len(records) < count:
         scene = random_scene(body, rng, lowest, places)
@@ -80,29 +77,22 @@ def selftest(
     return records
 
 
-def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
-    """Return a model of a body that does not use its pack: (lines, waveform, places).
+def exact_lines(body: Body, h: float | None = None) -> tuple[Lines, Places]:
+    """Return a model of a body that does not use its pack: (lines, places).
 
     `lines(scene)` returns frequencies (f,) in Hz and amplitudes (f,) in m at the only probe of a
-    scene, `waveform(scene)` its motion (t,) in m from rest. They are valid at `places` (p, 2) in m,
-    () for any place.
+    scene. The probe must be one of `places` in m, () for any place.
     """
-    method = pack_method(body)
-    if method != "poles":
-        model = "flat-body" if method == "radial" else FROM_REST.name
-        return _steady_lines, lambda scene: compute(scene, model).values[:, 0], ()
-    size = SolveOptions(h=h or body.of_kind.interactive_size)
-    places = _places_on(body)
+    if pack_method(body) != "poles":
+        return _steady_lines, ()
+    size, places = SolveOptions(h=h or body.of_kind.interactive_size), _places_on(body)
     prepared = reduce_scene(Scene(pressure=STILL, body=body, probes=places), size)
-
-    def index(scene: Scene) -> int:
-        return int(np.linalg.norm(np.array(places) - scene.probes[0], axis=1).argmin())
 
     def lines(scene: Scene) -> tuple[Floats, Complex]:
         motion = components(prepared, *scene.loads)
-        return motion.frequencies, motion.lines[:, index(scene)]
+        return motion.frequencies, motion.lines[:, places.index(scene.probes[0])]
 
-    return lines, lambda scene: answer(prepared, scene).values[:, index(scene)], places
+    return lines, places
 
 
 def _places_on(body: Body) -> Places:
@@ -120,7 +110,7 @@ def _places_on(body: Body) -> Places:
 
 
 def _steady_lines(scene: Scene) -> tuple[Floats, Complex]:
-    """Return the lines of layers or a sheet at the only probe of a scene, as in `exact`."""
+    """Return the lines of layers or a sheet at the only probe of a scene, as in `exact_lines`."""
     if pack_method(scene.body) == "modal":
         f, lines = plate_lines(scene, scene.probe_points)
     else:

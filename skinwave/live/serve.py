@@ -47,12 +47,12 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
 
-    def __init__(self, port: int = 0, base: str = "/", token: str = "") -> None:
+    def __init__(self, port: int = 0, base: str = "/") -> None:
         if not re.fullmatch(r"/([\w.~%@:+-]+/)*", base):
             raise ValueError(
                 f"base-url = {base} is not a path. Give a path such as /user/name/proxy/8123/."
             )
-        self.base, self.token = base, token or secrets.token_urlsafe(24)
+        self.base, self.token = base, secrets.token_urlsafe(24)
         try:
             super().__init__(("127.0.0.1", port), _Handler)
         except (OSError, OverflowError) as error:

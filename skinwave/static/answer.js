@@ -52,8 +52,8 @@ export function mapsOf(answer) {
 }
 
 /**
- * Validity {stretching, invalid} of an answer. `stretching` is the error of a sheet's lines by its stretching,
- * which this page leaves out. `invalid` is the reason why the result is not valid, or "".
+ * Validity {stretching, invalid} of an answer. `stretching` is the error of a sheet's lines by its
+ * stretching, which this page leaves out. `invalid` is the reason why the result is not valid, or "".
  */
 function validity({ body, waves, x, y }) {
   if (!body.thickness_mm) return { stretching: 0, invalid: "" };

@@ -9,7 +9,8 @@ const TAU = 2 * Math.PI;
 const PACINIAN = -13, NON_PACINIAN = 12; // dB re 1 um peak: at 250 Hz for a focal spot; at any frequency
 const LOWEST = 10, HIGHEST = 1000; // Hz: range of the thresholds
 const PRESSURE = 2.2, PRESSURE_AT = 200; // threshold of a component in Pa, and its frequency in Hz
-const SIDE = 45, HALF = 0.044; // places along a side of a map, and half its width in metre
+const SIDE = 45; // places along a side of a map
+export const HALF = 0.044; // m: half the width of a map
 const EXAMINED = 0.06, STEP = 2e-4; // s of motion in which the largest is looked for, and the time step
 const LEVELS = 4096; // instants of a rhythm that are averaged
 const OUTSIDE = 0.1; // of the largest RMS: edge of the kernel's region

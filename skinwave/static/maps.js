@@ -1,10 +1,10 @@
 // Maps of a surface as SVG. Values are by place, row y and column x ascending.
 
+import { HALF } from "./evaluate.js";
 import { cached, largestOf } from "./numeric.js";
 import { SEQUENTIAL, SIGNED, TABLE_LENGTH } from "./palette.js";
 import { escaped, withUnit } from "./text.js";
 
-const REACH = 0.044; // m: half the width of a map
 const MARGIN = { left: 32, right: 10, top: 20, bottom: 50 }; // px around the map for text, ticks and bar
 const TICKS = [-40, -20, 0, 20, 40]; // mm
 const INFLUENCED = -20; // dB re the largest of the kernel: edge of its region
@@ -53,8 +53,8 @@ function boxIn(width, height) {
   return { side, x: MARGIN.left + Math.max(0, (room - side) / 2), y: MARGIN.top };
 }
 
-const toPixels = (box) => ([x, y]) => [box.x + box.side * (0.5 + x / (2 * REACH)),
-  box.y + box.side * (0.5 - y / (2 * REACH))];
+const toPixels = (box) => ([x, y]) => [box.x + box.side * (0.5 + x / (2 * HALF)),
+  box.y + box.side * (0.5 - y / (2 * HALF))];
 const mm = (value) => `${Math.round(1e4 * value) / 10 || 0}`.replace("-", "−");
 
 /** A line through points, or lines through every `apart` of them. */
@@ -174,7 +174,7 @@ function barMarkup({ largest, unit, decibel, signed }, { box, bar: url }) {
 /** Value of a map at the place nearest to [x, y] in metre; NaN off the body. */
 function valueAt({ rms }, at) {
   const n = sideOf({ rms });
-  const [i, j] = at.map((place) => Math.round((place / REACH + 1) * (n - 1) / 2));
+  const [i, j] = at.map((place) => Math.round((place / HALF + 1) * (n - 1) / 2));
   return Math.min(i, j) < 0 || Math.max(i, j) >= n ? NaN : rms[j * n + i];
 }
 
@@ -276,13 +276,13 @@ export function mapControls(svg, onPoint, onCorner) {
   const place = (event) => {
     const { box } = states.get(svg), bounds = svg.getBoundingClientRect();
     const parts = [event.clientX - bounds.left - box.x, bounds.top + box.y + box.side - event.clientY];
-    return parts.map((part) => 2 * REACH * (part / box.side - 0.5));
+    return parts.map((part) => 2 * HALF * (part / box.side - 0.5));
   };
-  const bounded = (at) => at.map((v) => Math.round(1e4 * Math.min(Math.max(v, -REACH), REACH)) / 1e4);
+  const bounded = (at) => at.map((v) => Math.round(1e4 * Math.min(Math.max(v, -HALF), HALF)) / 1e4);
   const hover = (at) => {
     const state = states.get(svg);
     if (!state) return;
-    const within = at && Math.max(...at.map(Math.abs)) <= REACH;
+    const within = at && Math.max(...at.map(Math.abs)) <= HALF;
     state.hover = within ? at.map((v) => Math.round(1e3 * v) / 1e3) : null;
     drawMap(svg, state.options);
   };

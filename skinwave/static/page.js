@@ -144,14 +144,15 @@ function show({ values, past, bodies, answer, pinned, measured, errors, notice, 
   part("tiles", [answer, pinned], () => showTiles(answer, pinned));
   const key = keyOfLevels(state), levels = view.levels?.key === key ? view.levels : null;
   part("due levels", [key, tab], computeLevelsSoon);
-  part("pane", [tab, tab === "ab" ? answer : kernel, pinned, highest, levels, body.dispersion, body.hasFailed],
+  const result = tab === "ab" ? answer : kernel, { dispersion, hasFailed } = body;
+  part("pane", [tab, result, pinned, highest, levels, dispersion, hasFailed],
     () => showPane(state, levels, options.highest));
   if (look === "3d") {
     if (answer.maps) part("solid", [answer.maps], () => showSolid(answer));
   } else {
     part("time", [clock, load, span], () => showTime(state));
-    const isNew = part("maps", [answer.maps, pinned, look, view.decibel, playing, playing || clock, innerWidth,
-      innerHeight], () => drawMaps(drawMap));
+    const isNew = part("maps", [answer.maps, pinned, look, view.decibel, playing, playing || clock,
+      innerWidth, innerHeight], () => drawMaps(drawMap));
     if (playing && !isNew) drawMaps(moveMap);
   }
   part("spoken", [answer], speakSoon);
@@ -511,7 +512,8 @@ function begin() {
   const { values: own, refused, view } = readAddress(starts);
   const values = { ...own, body: recordOf(own.body).name };
   update({ values, past: { steps: [values], at: 0 }, notice: refused, playing: false,
-    look: LOOKS.includes(view.view) ? view.view : "maps", tab: TABS.includes(view.tab) ? view.tab : "lines" });
+    look: LOOKS.includes(view.view) ? view.view : "maps",
+    tab: TABS.includes(view.tab) ? view.tab : "lines" });
   onFrame(performance.now());
   if (view.selftest !== undefined) runSelftest(data, bodyOf, loadOf);
 }

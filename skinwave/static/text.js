@@ -19,7 +19,7 @@ export function withUnit(value, unit) {
   return `${rounded(scale * value)} ${prefix}${unit}`;
 }
 
-/** Return a level with its sign: whole, or with one decimal if it is below 1; "< −120" if it is round-off. */
+/** Return a level with its sign: whole, with one decimal if it is below 1, "< −120" if it is round-off. */
 export function signed(value) {
   if (!Number.isFinite(value)) return "–";
   if (value < -120) return "< −120";

@@ -22,7 +22,8 @@ SCENE = b'name = "s"\n[tacton]\nam_frequency_hz = 90\n[body]\npreset = "skin-sla
 
 class Client:
     def __init__(self, base="/"):
-        self.server = serve.Server(base=base, token="right")
+        self.server = serve.Server(base=base)
+        self.server.token = "right"
         self.server.show(DATA)
         self.thread = threading.Thread(target=self.server.serve_forever, daemon=True)
         self.thread.start()
