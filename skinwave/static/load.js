@@ -117,26 +117,28 @@ export function drawingFrequency(path) {
   return length > 0 ? path.speed / length : 0;
 }
 
+/** Function that gives the place on straight lines between points, which it passes at ascending marks. */
+function along(points, marks) {
+  const axes = [0, 1].map((axis) => points.map((at) => at[axis]));
+  return (mark) => axes.map((own) => interpolate(mark, marks, own));
+}
+
 /** Position [x, y] in metre as a function of the fraction 0..1 of the period. */
 export function positionOf(path) {
   if (path.shape === "joined") {
-    const { points, times } = joinedCorners(path);
-    const [xs, ys] = [0, 1].map((axis) => points.map((at) => at[axis]));
-    const period = path.paths.length / path.drawn;
-    return (p) => [xs, ys].map((own) => interpolate(p * period + AFTER_JUMP, times, own));
+    const { points, times } = joinedCorners(path), at = along(points, times);
+    return (p) => at(p * path.paths.length / path.drawn + AFTER_JUMP);
   }
   const [cx, cy] = path.centre || [0, 0];
   if (path.shape === "circle") {
     return (p) => [path.size / 2 * Math.cos(TAU * p) + cx, path.size / 2 * Math.sin(TAU * p) + cy];
   }
-  const { corners, runsOn } = outline(path), along = arc(corners), whole = along[along.length - 1];
-  const [xs, ys] = [0, 1].map((axis) => corners.map((at) => at[axis]));
-  if (!whole) return () => [xs[0] + cx, ys[0] + cy];
-  return (p) => {
-    let way = p;
-    if (!runsOn) way = path.sweep === "sinusoidal" ? (1 - Math.cos(TAU * p)) / 2 : 1 - Math.abs(1 - 2 * p);
-    return [interpolate(way * whole, along, xs) + cx, interpolate(way * whole, along, ys) + cy];
-  };
+  const { corners, runsOn } = outline(path), lengths = arc(corners), whole = lengths[lengths.length - 1];
+  const points = corners.map(([x, y]) => [x + cx, y + cy]), at = along(points, lengths);
+  if (!whole) return () => points[0];
+  if (runsOn) return (p) => at(p * whole);
+  return (p) => at(whole * (path.sweep === "sinusoidal" ? (1 - Math.cos(TAU * p)) / 2
+    : 1 - Math.abs(1 - 2 * p)));
 }
 
 /** Fractions of the period at which a focus jumps. */
