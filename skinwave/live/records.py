@@ -143,7 +143,7 @@ def editables(body: Body) -> list[Editable]:
 
 
 def _part(body: Body, owner: str, record: Any, name: str, label: str, **more: Any) -> Editable:
-    """Return the field `name` of a record, which is the field `owner` of a body, or the body."""
+    """Return the field `name` of a record: the body itself, or its field `owner`."""
     value = getattr(record, name)
 
     def change(new: Any) -> Body:

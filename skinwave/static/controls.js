@@ -86,7 +86,7 @@ export function buildControls(host, { editable, current, change, refuse, hold, e
     const { key, field, body } = target.dataset;
     if (key) { hold(false); take(key, target.value, true); }
     else if (field) take(field, target.value, true);
-    else if (body) editSoon(body, target.value);
+    else if (body) edit(body, target.value);
   });
   host.addEventListener("pointerup", ({ target }) => target.type === "range" && hold(false));
   host.addEventListener("focusout", ({ target }) => {
