@@ -1,24 +1,20 @@
-"""Agreement of models on random scenes.
+"""Agreement of models on random scenes; bench/README.md says when a pair of models agrees.
 
-`python -m bench.agreement N SEED` draws N scenes over the keys of a scene file, computes each by
-every model that accepts it, and compares each pair of responses. A pair agrees if, at the worst
-probe, the relative L2 difference over the whole record is at most 1.2 times the sum of both
-expected errors. Scenes with disagreements are printed as scene files.
-
-A scene depends only on the seed and its number; `--first K` starts at number K.
+A scene depends only on the seed and its number.
 """
 
 import argparse
 import copy
 import math
 import random
-import sys
 import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import combinations
 from multiprocessing import get_context
 from typing import Any
@@ -27,11 +23,11 @@ import numpy as np
 import tomli_w
 
 import skinwave
+from bench import table
 from fem.transient import Diverged
-from simple_model import Response
 from skinwave import models
+from skinwave.models.relative_change import relative_changes
 from skinwave.scene.file import from_table
-from skinwave.scene.scene import Scene
 
 SLACK = 1.2  # times the sum of the stated errors
 FLOOR = 2e-3  # relative: smaller differences are round-off and interpolation
@@ -42,8 +38,8 @@ KERNELS = ("point-kernel", "point-kernel-published")  # their response is a pres
 Table = dict[str, Any]
 
 
-def table(number: int, seed: int) -> Table:
-    """Return the scene with a number and a seed, as a table with the keys of a scene file."""
+def random_scene(number: int, seed: int) -> Table:
+    """Return the scene with a number and a seed, with the keys of a scene file."""
     draw = random.Random(f"{seed}-{number}")
     body = _body(draw)
     reach = 0.35 * min(body["size_x_mm"], body["size_y_mm"], 40)
@@ -275,65 +271,6 @@ class TooSlow(Exception):
     """A response took longer than the limit."""
 
 
-@dataclass(frozen=True)
-class Pair:
-    """Difference of two models' responses at the worst probe, and the sum of their stated
-    errors.
-    """
-
-    models: tuple[str, str]
-    difference: float
-    stated: float
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the difference is within the stated errors."""
-        return self.difference <= SLACK * self.stated + FLOOR
-
-
-@dataclass
-class Outcome:
-    """Outcome of one scene: pairs, faults, slow models, and refusals and stated errors by model."""
-
-    number: int
-    scene: Table
-    pairs: list[Pair] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
-    slow: list[str] = field(default_factory=list)
-    refusals: dict[str, str] = field(default_factory=dict)
-    stated: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def disagreements(self) -> list[Pair]:
-        """Pairs that disagree."""
-        return [pair for pair in self.pairs if not pair.agrees]
-
-
-def outcome(
-    number: int, scene: Table, only: tuple[str, ...] = (), slowest: float = SLOWEST
-) -> Outcome:
-    """Compute a scene by all or some models, and compare the responses."""
-    result = Outcome(number, scene)
-    try:
-        parsed = from_table(copy.deepcopy(scene))
-    except ValueError as error:
-        result.refusals["scene"] = str(error)
-        return result
-    responses: dict[str, Response] = {}
-    for name in only or [each for each in models.names() if each not in KERNELS]:
-        try:
-            responses[name] = _response(parsed, name, slowest)
-        except TooSlow:
-            result.slow.append(name)
-        except (ValueError, Diverged) as error:
-            result.refusals[name] = str(error)
-        except Exception:
-            result.faults.append(f"{name}: {traceback.format_exc(limit=-2)}")
-    result.stated = {name: each.expected_error for name, each in responses.items()}
-    result.pairs = list(_pairs(responses))
-    return result
-
-
 def limited(seconds: float) -> Callable[[str, float], None]:
     """Return a progress callback that raises TooSlow after some seconds of CPU time from now."""
     until = time.process_time() + seconds
@@ -345,34 +282,88 @@ def limited(seconds: float) -> Callable[[str, float], None]:
     return watch
 
 
-def _response(scene: Scene, model: str, seconds: float) -> Response:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", skinwave.SkinwaveWarning)
-        return skinwave.simulate(scene, model, TOLERANCE, limited(seconds))
+@dataclass(frozen=True)
+class Pair:
+    """Difference of two models' responses at the worst probe, and the stated error of each."""
+
+    models: tuple[str, str]
+    difference: float
+    stated: tuple[float, float]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the difference is within the stated errors."""
+        return self.difference <= SLACK * sum(self.stated) + FLOOR
+
+    def __str__(self) -> str:
+        names = map("{} ({:.2%})".format, self.models, self.stated)
+        return f"{' and '.join(names)}: {self.difference:.2%}"
 
 
-def _pairs(responses: dict[str, Response]) -> Iterator[Pair]:
-    for one, other in combinations(responses, 2):
-        a, b = responses[one], responses[other]
-        stated = a.expected_error + b.expected_error
-        if math.isinf(stated):
+@dataclass
+class Outcome:
+    """Outcome of one scene: pairs of models, faults, and slow models."""
+
+    number: int
+    scene: Table
+    pairs: list[Pair] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    slow: list[str] = field(default_factory=list)
+    is_refused: bool = False
+
+    @property
+    def disagreements(self) -> list[Pair]:
+        """Pairs that disagree."""
+        return [pair for pair in self.pairs if not pair.agrees]
+
+    def __str__(self) -> str:
+        bad, kind = self.disagreements, self.scene["body"]["kind"]
+        slow = f", slow: {', '.join(self.slow)}" if self.slow else ""
+        head = f"{kind}, {len(self.pairs)} pairs, {len(bad)} disagree{slow}"
+        lines = [f"scene {self.number}: {head}", *map(str, bad), *self.faults]
+        if bad or self.faults:
+            lines.append(f"  {tomli_w.dumps(self.scene)}".replace("\n", "\n    "))
+        return "\n  ".join(lines)
+
+
+def outcome(
+    number: int, scene: Table, only: tuple[str, ...] = (), slowest: float = SLOWEST
+) -> Outcome:
+    """Compute a scene by all or some models, and compare the responses."""
+    result, responses = Outcome(number, scene), {}
+    try:
+        parsed = from_table(copy.deepcopy(scene))
+    except ValueError:
+        result.is_refused = True
+        return result
+    for name in only or [each for each in models.names() if each not in KERNELS]:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", skinwave.SkinwaveWarning)
+                found = skinwave.simulate(parsed, name, TOLERANCE, limited(slowest))
+            responses[name] = found
+        except TooSlow:
+            result.slow.append(name)
+        except (ValueError, Diverged):  # refused
             continue
-        yield Pair((one, other), _difference(np.asarray(a.values), np.asarray(b.values)), stated)
+        except Exception:
+            result.faults.append(f"fault of {name}: {traceback.format_exc(limit=-2)}")
+    for names in combinations(responses, 2):
+        a, b = (responses[name] for name in names)
+        stated = a.expected_error, b.expected_error
+        if not math.isinf(sum(stated)):
+            result.pairs.append(Pair(names, difference(a.values, b.values), stated))
+    return result
 
 
-def _difference(a: np.ndarray, b: np.ndarray) -> float:
-    """Return the relative L2 difference at the worst probe."""
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the relative L2 difference of responses (t, p) at the worst probe."""
     if a.shape != b.shape:
         return math.inf
-    sizes = np.maximum(np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0))
+    larger = np.where(np.linalg.norm(a, axis=0) > np.linalg.norm(b, axis=0), a, b)
+    sizes = np.linalg.norm(larger, axis=0)
     moves = sizes > WEAKEST * sizes.max()
-    differences = np.linalg.norm(a - b, axis=0)[moves] / sizes[moves]
-    return float(differences.max(initial=0.0))
-
-
-def _from_number(given: tuple[int, int, tuple[str, ...], float]) -> Outcome:
-    number, seed, only, slowest = given
-    return outcome(number, table(number, seed), only, slowest)
+    return float(relative_changes(a - b, larger)[moves].max(initial=0.0))
 
 
 def main() -> int:
@@ -388,41 +379,25 @@ def main() -> int:
     )
     given = parser.parse_args()
     numbers = range(given.first, given.first + given.count)
-    work = [(k, given.seed, tuple(given.models), given.slowest) for k in numbers]
+    scenes = [random_scene(k, given.seed) for k in numbers]
+    run = partial(outcome, only=tuple(given.models), slowest=given.slowest)
     outcomes = []
-    with get_context("spawn").Pool(given.workers, maxtasksperchild=20) as pool:
-        for each in pool.imap(_from_number, work):
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(given.workers, spawn, max_tasks_per_child=20) as pool:
+        for each in pool.map(run, numbers, scenes):
             outcomes.append(each)
-            _print_outcome(each)
-    _print_summary(outcomes)
-    return int(any(each.disagreements or each.faults for each in outcomes))
-
-
-def _print_outcome(result: Outcome) -> None:
-    bad, kind = result.disagreements, result.scene["body"]["kind"]
-    slow = f", slow: {', '.join(result.slow)}" if result.slow else ""
-    print(f"scene {result.number}: {kind}, {len(result.pairs)} pairs, {len(bad)} disagree{slow}")
-    for pair in bad:
-        names = " and ".join(f"{name} ({result.stated[name]:.2%})" for name in pair.models)
-        print(f"  {names}: {pair.difference:.2%}")
-    for fault in result.faults:
-        print(f"  fault: {fault}")
-    if bad or result.faults:
-        print("    " + tomli_w.dumps(result.scene).replace("\n", "\n    "))
-    sys.stdout.flush()
-
-
-def _print_summary(outcomes: list[Outcome]) -> None:
+            print(each, flush=True)
     pairs = [pair for each in outcomes for pair in each.pairs]
     shared = Counter(pair.models for pair in pairs)
     bad = Counter(pair.models for pair in pairs if not pair.agrees)
-    print(f"\n{'pair':<50} {'scenes':>7} {'disagree':>9}")
-    for one, other in sorted(shared):
-        print(f"{one + ', ' + other:<50} {shared[one, other]:>7} {bad[one, other]:>9}")
-    refused = sum("scene" in each.refusals for each in outcomes)
+    row = table("pair", "scenes", "disagree")
+    for names in sorted(shared):
+        row(", ".join(names), f"{shared[names]}", f"{bad[names]}")
+    refused = sum(each.is_refused for each in outcomes)
     faults = sum(len(each.faults) for each in outcomes)
     print(f"{len(outcomes)} scenes, {refused} refused: {len(pairs)} pairs, {sum(bad.values())} "
           f"disagree; {faults} faults")  # fmt: skip
+    return int(any(each.disagreements or each.faults for each in outcomes))
 
 
 if __name__ == "__main__":

@@ -1,31 +1,27 @@
-"""Comparison with other codes: `python -m bench.beside [assembly | waves | fingertip]`.
+"""Cost of other codes to assemble and to step in time, and their motion of a fingertip.
 
-The tables of cost use one mesh, material and load, and one process for each code. The skin slab has
-free sides, because not every code has absorbing ones, and Poisson's ratio 0.45, up to which plain
-quadratic tetrahedra do not lock. skinwave computes the nodal forces beforehand. A code that is not
-installed is reported as not measured.
-
-`fingertip` solves the fingertip of the verification by scikit-fem on the same mesh. It prints the
-largest difference of the motion of any node, and the values in `skinwave/verify/statics.py`.
+Each code assembles K and M and factorises M + c K as in its documentation, in a process of its own.
+The time loop, loads and probes are shared; they refer to the nodes of the mesh, and `to_nodes` maps
+them to a code's own dofs. The skin slab has free sides, because not every code has absorbing ones,
+and Poisson's ratio 0.45, up to which plain quadratic tetrahedra do not lock.
 """
 
+import argparse
 import contextlib
-import sys
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.metadata import version
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_array
-from scipy.sparse.linalg import LinearOperator, cg, splu
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, cg, splu, spsolve
+from scipy.spatial import cKDTree
 
 import fem
 import meshes
-from bench.codes import CODES, Assembled, Problem
+from bench import in_process, table, timed
 from skinwave.bodies.build import build
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, reduce_scene
@@ -33,6 +29,7 @@ from skinwave.scene import paper15
 from skinwave.scene.scene import PROBES, Body
 from skinwave.verify import statics
 
+Solve = Callable[[np.ndarray], np.ndarray]
 SKIN = replace(fem.PRESETS["palm"], poisson=0.45)
 BODY = Body(material=SKIN, sides="free")
 TACTON = "am140-stm20"
@@ -41,17 +38,226 @@ SIZE = 4.7e-3  # m, elements of the waves
 RATE, STEPS = 10_000, 1000  # steps per second, for an error of 1 %; steps that are timed
 
 
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """A body of straight 10-node tetrahedra.
+
+    `nodes` (n, 3) in metres, corners first; `cells` (m, 10) in VTK's order; `surface` (k, 3), the
+    corners of boundary facets; `mu` in Pa, `nu`, `rho` in kg/m3, for scikit-fem also (m, 1).
+    """
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    surface: np.ndarray
+    mu: Any
+    nu: Any
+    rho: Any
+
+    @property
+    def tets(self) -> np.ndarray:
+        return self.cells[:, :4]
+
+    @property
+    def points(self) -> np.ndarray:
+        """The corners, which most codes take."""
+        return self.nodes[: self.tets.max() + 1]
+
+    @property
+    def lam(self) -> Any:
+        return 2 * self.mu * self.nu / (1 - 2 * self.nu)
+
+
+@dataclass
+class Assembled:
+    """Operators of a code: `K` and `M` multiply vectors of its own dofs by `@`.
+
+    `to_nodes` (3 n, dofs) gives the displacement of the nodes, component fastest. `factorise(c,
+    free)` returns a function that solves with M + c K on the free dofs and returns 0 on the others.
+    """
+
+    seconds: float
+    K: Any
+    M: Any
+    to_nodes: sparse.csr_array
+    factorise: Callable[[float, np.ndarray], Solve]
+
+    def check(self, nodes: np.ndarray) -> tuple[float, float]:
+        """Return the strain energy in J of u = (x^2, x y, 0) and the mass in kg."""
+        x, y, _ = nodes.T
+        bent, moved = np.zeros((2, *nodes.shape))
+        bent[:, 0], bent[:, 1], moved[:, 0] = x * x, x * y, 1
+        transfer = sparse.csc_matrix(self.to_nodes)  # spsolve needs a matrix, not an array
+        u, one = (spsolve(transfer, values.ravel()) for values in (bent, moved))
+        return float(u @ (self.K @ u) / 2), float(one @ (self.M @ one))
+
+
+def skinwave(p: Problem) -> Assembled:
+    mesh = meshes.TetMesh(points=p.nodes, tets=p.cells)
+    material = fem.Material(density=p.rho, shear_modulus=p.mu, poisson=p.nu)
+    free = np.zeros(mesh.points.shape, bool)
+    ops, seconds = timed(fem.assemble, mesh, material, fixed=free)
+    return _scipy(seconds, ops.K, ops.M, np.arange(mesh.n_dofs), lambda A: fem.factorise(A).solve)
+
+
+def scikit_fem(p: Problem) -> Assembled:
+    from skfem import Basis, BilinearForm, ElementTetP2, ElementVector, MeshTet
+    from skfem.helpers import ddot, dot, eye, sym_grad, trace
+
+    mesh = MeshTet(np.ascontiguousarray(p.points.T), np.ascontiguousarray(p.tets.T))
+
+    @BilinearForm
+    def stiffness(u: Any, v: Any, w: Any) -> Any:
+        e = sym_grad(u)
+        return ddot(2 * p.mu * e + p.lam * eye(trace(e), 3), sym_grad(v))
+
+    @BilinearForm
+    def mass(u: Any, v: Any, w: Any) -> Any:
+        return p.rho * dot(u, v)
+
+    started = time.perf_counter()
+    basis = Basis(mesh, ElementVector(ElementTetP2()), intorder=2)
+    K = stiffness.assemble(basis)
+    M = mass.assemble(Basis(mesh, basis.elem, intorder=4))
+    seconds = time.perf_counter() - started
+    component = np.empty(K.shape[0], int)
+    for i in range(3):
+        component[basis.nodal_dofs[i]] = component[basis.edge_dofs[i]] = i
+    # Its example 19 steps in time with SciPy's splu.
+    return _scipy(seconds, K, M, 3 * _match_nodes(basis.doflocs.T, p.nodes) + component, _superlu)
+
+
+def ngsolve(p: Problem) -> Assembled:
+    import ngsolve as ng
+    from netgen.meshing import Element2D, Element3D, FaceDescriptor, MeshPoint, Pnt
+    from netgen.meshing import Mesh as NetgenMesh
+
+    raw = NetgenMesh(dim=3)
+    numbers = [raw.Add(MeshPoint(Pnt(*point))) for point in p.points.tolist()]
+    for tet in p.tets.tolist():
+        raw.Add(Element3D(1, [numbers[i] for i in tet]))
+    raw.Add(FaceDescriptor(surfnr=1, domin=1, bc=1))
+    for face in p.surface.tolist():
+        raw.Add(Element2D(1, [numbers[i] for i in face]))
+    mesh = ng.Mesh(raw)
+    started = time.perf_counter()
+    space = ng.VectorH1(mesh, order=2)
+    u, v = space.TnT()
+
+    def strain(w: Any) -> Any:
+        return ng.Sym(ng.Grad(w))
+
+    elastic = 2 * p.mu * ng.InnerProduct(strain(u), strain(v)) + p.lam * ng.div(u) * ng.div(v)
+    with ng.TaskManager():
+        K = ng.BilinearForm(elastic * ng.dx).Assemble()
+        M = ng.BilinearForm(p.rho * u * v * ng.dx).Assemble()
+    seconds = time.perf_counter() - started
+
+    def factorise(c: float, free: np.ndarray) -> Solve:
+        A = M.mat.CreateMatrix()
+        A.AsVector().data = M.mat.AsVector() + c * K.mat.AsVector()
+        return _of_arrays(A.Inverse(ng.BitArray(free.tolist()), inverse="sparsecholesky"))
+
+    shape = (space.ndof, space.ndof)
+    products = (LinearOperator(shape, _of_arrays(each.mat), dtype=float) for each in (K, M))
+    return Assembled(seconds, *products, _from_hierarchical(p, mesh), factorise)
+
+
+def _of_arrays(operator: Any) -> Solve:
+    """Wrap an operator of NGSolve for numpy arrays; copies take a few thousandths of its time."""
+    x, y = operator.CreateColVector(), operator.CreateRowVector()
+
+    def apply(values: np.ndarray) -> np.ndarray:
+        x.FV().NumPy()[:] = values
+        y.data = operator * x
+        return y.FV().NumPy().copy()
+
+    return apply
+
+
+def _from_hierarchical(p: Problem, mesh: Any) -> sparse.csr_array:
+    """Map NGSolve's dofs, values at corners and one bubble for each edge, to nodal values."""
+    import ngsolve as ng
+
+    ends = np.array([[vertex.nr for vertex in edge.vertices] for edge in mesh.edges])
+    middles = (p.points[ends[:, 0]] + p.points[ends[:, 1]]) / 2
+    node, corners, edges = _match_nodes(middles, p.nodes), len(p.points), len(ends)
+    bubble = ng.GridFunction(ng.H1(mesh, order=2))
+    bubble.vec[corners] = 1
+    height = bubble(mesh(*middles[0]))
+    rows = np.concatenate([np.arange(corners), node, node, node])
+    columns = np.concatenate([np.arange(corners), *ends.T, corners + np.arange(edges)])
+    values = np.concatenate([np.ones(corners), np.full(2 * edges, 0.5), np.full(edges, height)])
+    scalar = sparse.csr_array((values, (rows, columns)), shape=(len(p.nodes), corners + edges))
+    # NGSolve orders dofs component by component, skinwave node by node.
+    by_component = sparse.csr_array(sparse.kron(np.eye(3), scalar))
+    return by_component[np.arange(3 * len(p.nodes)).reshape(3, -1).T.ravel()]
+
+
+def felupe(p: Problem) -> Assembled:
+    import felupe as fe
+
+    mesh = fe.Mesh(p.nodes, p.cells, "tetra10")
+    started = time.perf_counter()
+    region = fe.RegionQuadraticTetra(mesh)
+    field = fe.FieldContainer([fe.Field(region, dim=3)])
+    umat = fe.LinearElastic(E=2 * p.mu * (1 + p.nu), nu=p.nu)
+    K = fe.SolidBody(umat, field).assemble.matrix()
+    fine = fe.RegionQuadraticTetra(mesh, quadrature=fe.quadrature.Tetrahedron(order=5))
+    heavy = fe.FieldContainer([fe.Field(fine, dim=3)])
+    M = fe.SolidBody(umat, heavy, density=p.rho).assemble.mass()
+    seconds = time.perf_counter() - started
+    # Its Newton solver calls SciPy's spsolve, which uses splu for a single right-hand side.
+    return _scipy(seconds, K, M, np.arange(K.shape[0]), _superlu)
+
+
+def _scipy(
+    seconds: float, K: Any, M: Any, numbers: np.ndarray, factorised: Callable[[Any], Solve]
+) -> Assembled:
+    """Return matrices of SciPy; dof i is component `numbers[i]` of the mesh."""
+
+    def factorise(c: float, free: np.ndarray) -> Solve:
+        dofs = np.flatnonzero(free)
+        solve = factorised(sparse.csr_array(M + c * K)[dofs][:, dofs])
+
+        def on_all(b: np.ndarray) -> np.ndarray:
+            x = np.zeros(len(b))
+            x[dofs] = solve(b[dofs])
+            return x
+
+        return on_all
+
+    to_nodes = sparse.csr_array((np.ones(len(numbers)), (numbers, np.arange(len(numbers)))))
+    return Assembled(seconds, K, M, to_nodes, factorise)
+
+
+def _superlu(A: Any) -> Solve:
+    return splu(A.tocsc()).solve
+
+
+def _match_nodes(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return the number of the node at each point."""
+    distance, number = cKDTree(nodes).query(points)
+    if distance.max() > 1e-9:
+        raise ValueError(f"a point lies {distance.max():g} m from every node")
+    return number
+
+
+# Assembly of each code, by the name of its package.
+CODES = {
+    "skinwave": skinwave, "scikit-fem": scikit_fem, "ngsolve": ngsolve, "felupe": felupe
+}  # fmt: skip
+
+
 def assembly() -> None:
     """Print the time of each code to assemble K and M of a block."""
     small, large = (problem(block(n)) for n in ACROSS)
     print(f"K and M of {len(large.cells):,} ten-node tetrahedra")
-    print(f"{'code':<12}{'version':<12}{'s':>8}{'ratio':>7}{'energy J':>15}{'mass kg':>10}")
+    row = table("code", "version", "time", "ratio", "energy", "mass")
     first = None
-    for name, row in each_code(time_assembly, small, large):
-        seconds, (energy, mass) = row["seconds"], row["check"]
+    for name, seconds, energy, mass in each_code(time_assembly, small, large):
         first = first or seconds
-        print(f"{name:<12}{row['version']:<12}{seconds:8.2f}{seconds / first:7.1f}"
-              f"{energy:15.6e}{mass:10.6f}", flush=True)  # fmt: skip
+        ratio, package = seconds / first, version(name)[:11]
+        row(name, package, f"{seconds:.2f} s", f"{ratio:.1f}", f"{energy:.6e} J", f"{mass:.6f} kg")
 
 
 def waves() -> None:
@@ -61,29 +267,26 @@ def waves() -> None:
     mesh, times = build(BODY, SIZE).mesh, np.arange(STEPS + 1) / RATE
     P, points = fem.pressure_operator(mesh), fem.facet_points(mesh)
     load = {
-        "fixed": np.isin(np.arange(len(mesh.points)), mesh.facets["bottom"]),
-        "forces": csr_array(P @ scene.pressure(points, times).T),
+        "fixed": mesh.facets["bottom"],
+        "forces": sparse.csr_array(P @ scene.pressure(points, times).T),
         "probes": fem.probe_operator(mesh, PROBES),
     }
-    started = time.perf_counter()
-    prepared = reduce_scene(scene, SolveOptions(h=SIZE))
-    ready = time.perf_counter()
-    answer(prepared, scene)
-    one = time.perf_counter() - started
-    fifteen = one + 14 * (time.perf_counter() - ready)
+    prepared, offline = timed(reduce_scene, scene, SolveOptions(h=SIZE))
+    online = timed(answer, prepared, scene)[1]
+    one, fifteen = offline + online, offline + 15 * online
     print(f"{mesh.n_dofs:,} dofs, {RATE:,} steps a second")
-    print(f"{'code':<12}{'assemble':>9}{'factorise':>10}{'ms/step':>8}{'1 Tacton':>10}{'ratio':>7}"
-          f"{'15':>9}{'ratio':>7}{'to ours':>9}")  # fmt: skip
-    print(f"{'skinwave, reduced':<39}{one:9.1f}s{1:7.1f}{fifteen:8.1f}s{1:7.1f}")
+    row = table("code", "assemble", "factorise", "step", "1 Tacton", "ratio", "15", "ratio",
+                "to ours")  # fmt: skip
+    row("skinwave, reduced", "", "", "", f"{one:.1f} s", "1", f"{fifteen:.1f} s", "1", "")
     ours = None
-    for name, row in each_code(time_steps, problem(mesh), load):
-        once, second = row["seconds"] + row["factorise"], row["step"] * RATE
-        ours = row["motion"] if ours is None else ours
-        apart = np.linalg.norm(row["motion"] - ours) / np.linalg.norm(ours)
-        print(f"{name:<12}{row['seconds']:8.2f}s{row['factorise']:9.2f}s"
-              f"{1e3 * row['step']:8.2f}{once + second:9.1f}s{(once + second) / one:7.1f}"
-              f"{once + 15 * second:8.0f}s{(once + 15 * second) / fifteen:7.0f}{apart:9.1e}",
-              flush=True)  # fmt: skip
+    for name, assembled, factorised, step, motion in each_code(time_steps, problem(mesh), load):
+        once, second = assembled + factorised, step * RATE
+        ours = motion if ours is None else ours
+        apart = np.linalg.norm(motion - ours) / np.linalg.norm(ours)
+        row(name, f"{assembled:.2f} s", f"{factorised:.2f} s", f"{1e3 * step:.2f} ms",
+            f"{once + second:.0f} s", f"{(once + second) / one:.0f}",
+            f"{once + 15 * second:.0f} s", f"{(once + 15 * second) / fifteen:.0f}",
+            f"{apart:.1e}")  # fmt: skip
 
 
 def fingertip() -> None:
@@ -96,43 +299,40 @@ def fingertip() -> None:
             for key in ("shear_modulus", "poisson", "density", "viscosity")
         )
         tip = replace(problem(mesh), mu=mu, nu=nu, rho=rho)
-        body, C = CODES["scikit-fem"][0](tip), CODES["scikit-fem"][0](replace(tip, mu=viscosity)).K
-        is_fixed = np.repeat(np.isin(np.arange(len(mesh.points)), mesh.facets["sides"]), 3)
-        free = np.flatnonzero(abs(body.to_nodes[np.flatnonzero(is_fixed)]).sum(axis=0) == 0)
+        body, C = CODES["scikit-fem"](tip), CODES["scikit-fem"](replace(tip, mu=viscosity)).K
+        free = np.flatnonzero(free_dofs(body, mesh.facets["sides"]))
         force, w = body.to_nodes.T @ statics.fingertip_push(mesh), 2 * np.pi * statics.FREQUENCY
         motions = zip(statics.fingertip_motion(mesh, materials),
                       (body.K, body.K + 1j * w * C - w**2 * body.M), strict=True)  # fmt: skip
         for own, A in motions:
             found = np.zeros(len(force), A.dtype)
-            factor = splu(csc_matrix(A)[free][:, free])
+            factor = splu(sparse.csc_matrix(A)[free][:, free])
             found[free] = factor.solve(force[free].astype(A.dtype))
             other = body.to_nodes @ found
-            print(
-                f"{name}: largest difference {np.abs(own - other).max() / np.abs(other).max():.1e}"
-            )
+            apart = np.abs(own - other).max() / np.abs(other).max()
+            print(f"{name}: largest difference {apart:.1e}")
             print(statics.fingertip_summary(mesh, other).tolist())
 
 
-def time_assembly(name: str, small: Problem, large: Problem) -> dict[str, Any]:
-    """Return the seconds of a code after a warm-up, with strain energy and mass."""
+def time_assembly(name: str, small: Problem, large: Problem) -> tuple[float, float, float]:
+    """Return the seconds of a code after a warm-up, with strain energy in J and mass in kg."""
     with threads(name):
-        CODES[name][0](small)
-        body = CODES[name][0](large)
-        return {"seconds": body.seconds, "check": body.check(large.nodes)}
+        CODES[name](small)
+        body = CODES[name](large)
+        return body.seconds, *body.check(large.nodes)
 
 
-def time_steps(name: str, given: Problem, load: dict[str, Any]) -> dict[str, Any]:
+def time_steps(
+    name: str, given: Problem, load: dict[str, Any]
+) -> tuple[float, float, float, np.ndarray]:
     """Return the seconds of assembly, factorisation and a step of average acceleration from rest,
     and the displacement (t, p) of the probes.
     """
     with threads(name):
-        body, dt, lag = CODES[name][0](given), 1 / RATE, SKIN.viscosity / SKIN.shear_modulus
-        is_fixed = np.repeat(load["fixed"], 3)
-        free = abs(body.to_nodes[np.flatnonzero(is_fixed)]).sum(axis=0) == 0
+        body, dt, lag = CODES[name](given), 1 / RATE, SKIN.viscosity / SKIN.shear_modulus
+        free = free_dofs(body, load["fixed"])
         forces, read = body.to_nodes.T @ load["forces"], load["probes"] @ body.to_nodes
-        started = time.perf_counter()
-        solve = body.factorise(dt / 2 * lag + dt**2 / 4, free)
-        factorised = time.perf_counter() - started
+        solve, factorised = timed(body.factorise, dt / 2 * lag + dt**2 / 4, free)
         u = v = np.zeros(len(free))
         a = first_acceleration(body, forces[:, [0]].toarray().ravel(), free)
         motion, seconds = [read @ u], []
@@ -144,8 +344,12 @@ def time_steps(name: str, given: Problem, load: dict[str, Any]) -> dict[str, Any
             motion.append(read @ u)
             seconds.append(time.perf_counter() - started)
     # The median ignores steps delayed by other processes.
-    return {"seconds": body.seconds, "factorise": factorised, "step": np.median(seconds),
-            "motion": np.array(motion)}  # fmt: skip
+    return body.seconds, factorised, float(np.median(seconds)), np.array(motion)
+
+
+def free_dofs(body: Assembled, facets: np.ndarray) -> np.ndarray:
+    """Return which dofs of a code do not move the nodes of some facets."""
+    return abs(body.to_nodes[(3 * np.unique(facets)[:, None] + range(3)).ravel()]).sum(axis=0) == 0
 
 
 def first_acceleration(body: Assembled, force: np.ndarray, free: np.ndarray) -> np.ndarray:
@@ -177,18 +381,18 @@ def problem(mesh: meshes.TetMesh) -> Problem:
     )  # fmt: skip
 
 
-def each_code(run: Callable[..., dict], *given: Any) -> Iterator[tuple[str, dict]]:
-    """Yield the measurements of each installed code, from a process of its own."""
-    for name, (_, package) in CODES.items():
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
-            try:
-                row = alone.submit(run, name, *given).result()
-                yield name, row | {"version": version(package)[:11]}
-            except ImportError as error:
-                print(f"{name:<12}not measured: {error}", flush=True)
+def each_code(run: Callable[..., tuple], *given: Any) -> Iterator[tuple]:
+    """Yield the name and the measurements of each installed code, from a process of its own."""
+    for name in CODES:
+        try:
+            yield name, *in_process(run, name, *given)
+        except ImportError as error:
+            print(f"{name}: not measured: {error}", flush=True)
 
 
 if __name__ == "__main__":
     tables = {"assembly": assembly, "waves": waves, "fingertip": fingertip}
-    for table in sys.argv[1:] or tables:
-        tables[table]()
+    parser = argparse.ArgumentParser(description=__doc__, prog="python -m bench.beside")
+    parser.add_argument("table", nargs="*", choices=tables, default=[*tables])
+    for name in parser.parse_args().table:
+        tables[name]()

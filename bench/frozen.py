@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -26,39 +27,38 @@ CHECK = "check of a verification"
 
 
 def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
-    """Return the command and the compared files of each part; SCENES is a folder."""
+    """Return the command and the compared files of each part, for the scenes in `scenes`."""
     table = {"paper-15": (("compare",), ("lines.csv", "claims.csv", "responses.npz"))}
     for name in sorted(p.stem for p in (ROOT / "examples").glob("*.toml")):
-        table[f"run {name}"] = (("run", f"SCENES/{name}.toml"), ("lines.csv", "responses.npz"))
+        table[f"run {name}"] = (("run", f"scenes/{name}.toml"), ("lines.csv", "responses.npz"))
     for name in SCENES:
-        table[f"relax {name}"] = (("relax", f"SCENES/{name}.toml"), ("relax.csv", "responses.npz"))
+        table[f"relax {name}"] = (("relax", f"scenes/{name}.toml"), ("relax.csv", "responses.npz"))
     for k in range(PLANNED):
-        table[f"plan {k:02}"] = (("plan", f"SCENES/planned-{k:02}.toml", "--json"), ("said.json",))
+        table[f"plan {k:02}"] = (("plan", f"scenes/planned-{k:02}.toml", "--json"), ("said.json",))
     return table | {"verify": (("verify",), ("verify.json",))}
 
 
 def write_scenes(folder: Path) -> None:
-    """Write the examples and the random scenes of `bench.plans`."""
-    from bench.plans import scene
+    """Write the examples, and random slabs and sheets."""
+    from bench.plans import is_flat, scenes
     from skinwave.scene.file import dumps
 
     folder.mkdir(parents=True)
-    for path in (ROOT / "examples").glob("*.toml"):
-        (folder / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
-    for k in range(PLANNED):
-        text = dumps(scene(k)[0])
-        (folder / f"planned-{k:02}.toml").write_text(text, encoding="utf-8")
+    texts = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.toml")}
+    for k, (_, scene, _) in enumerate(islice(scenes(0, is_flat), PLANNED)):
+        texts[f"planned-{k:02}"] = dumps(scene)
+    for name, text in texts.items():
+        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
 
 
 def run(name: str, command: tuple[str, ...], scenes: Path, folder: Path, cache: str) -> Path:
-    """Run the command of a part, and return the folder with its files."""
+    """Run the command of a part beside its scenes, and return the folder with its files."""
     out = folder / name.replace(" ", "-")
-    words = [word.replace("SCENES", str(scenes)) for word in command]
-    if command[0] != "plan":
-        words += ["--out", str(out), "--quiet"]
-    env = os.environ | {"SKINWAVE_CACHE": cache, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    words = command if command[0] == "plan" else (*command, "--out", str(out), "--quiet")
+    env = os.environ | {"SKINWAVE_CACHE": cache, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
+                        "PYTHONPATH": str(ROOT)}  # fmt: skip
     done = subprocess.run([sys.executable, "-m", "skinwave", *words], capture_output=True,
-                          text=True, cwd=ROOT, env=env, check=False)  # fmt: skip
+                          text=True, cwd=scenes.parent, env=env, check=False)  # fmt: skip
     if done.returncode:
         raise SystemExit(f"{name}: exit code {done.returncode}: {done.stderr.strip()}")
     out.mkdir(exist_ok=True)
@@ -72,20 +72,28 @@ def numbers(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     if path.suffix == ".npz":
         with np.load(path) as arrays:
             return {name: arrays[name] for name in arrays.files}, []
-    if path.suffix == ".csv":
-        return _split(_cells(path))
-    return _split(_leaves(json.loads(path.read_text(encoding="utf-8")), ""))
+    with path.open(encoding="utf-8", newline="") as file:
+        values = [*(_cells(file) if path.suffix == ".csv" else _leaves(json.load(file), ""))]
+    columns: dict[str, list[float]] = {}
+    texts = []
+    for name, value in values:
+        if any(word in name for word in NOT_COMPARED):
+            continue
+        if isinstance(value, float):
+            columns.setdefault(name, []).append(value)
+        else:
+            texts.append(str(value))
+    return {name: np.array(column) for name, column in columns.items()}, texts
 
 
-def _cells(path: Path) -> Iterator[tuple[str, object]]:
-    with open(path, encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            palm = "palm " if any("palm" in str(cell) for cell in row.values()) else ""
-            for column, cell in row.items():
-                try:
-                    yield palm + column, float(cell)
-                except ValueError:
-                    yield column, cell
+def _cells(file: Iterator[str]) -> Iterator[tuple[str, object]]:
+    for row in csv.DictReader(file):
+        palm = "palm " if any("palm" in str(cell) for cell in row.values()) else ""
+        for column, cell in row.items():
+            try:
+                yield palm + column, float(cell)
+            except ValueError:
+                yield column, cell
 
 
 def _leaves(value: object, name: str) -> Iterator[tuple[str, object]]:
@@ -93,67 +101,41 @@ def _leaves(value: object, name: str) -> Iterator[tuple[str, object]]:
     if isinstance(value, dict) and "bar" in value:
         unit = max(abs(value["reference"] or 0.0), 1e6 * value["bar"])
         yield CHECK, float(value["value"] or 0.0) / (unit or 1.0)
-    elif isinstance(value, dict):
-        for key, inner in value.items():
+    elif isinstance(value, dict | list):
+        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _leaves(inner, f"{name} {key}".strip())
-    elif isinstance(value, list):
-        for k, inner in enumerate(value):
-            yield from _leaves(inner, f"{name} {k}")
     else:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         yield name, float(value) if is_number else value  # type: ignore[arg-type]
 
 
-def _split(values: Iterator[tuple[str, object]]) -> tuple[dict[str, np.ndarray], list[str]]:
-    numeric: dict[str, list[float]] = {}
-    text = []
-    for name, value in values:
-        if any(word in name for word in NOT_COMPARED):
-            continue
-        if isinstance(value, float):
-            numeric.setdefault(name, []).append(value)
-        else:
-            text.append(str(value))
-    return {name: np.array(column) for name, column in numeric.items()}, text
-
-
 def differences(before: Path, after: Path) -> Iterator[str]:
     """Yield differences between two files; names may have changed, but not the order."""
     (old, old_text), (new, new_text) = numbers(before), numbers(after)
-    if CHECK in old:
-        yield from _changed_checks(old[CHECK], new[CHECK])
-        return
     changed = sum(a != b for a, b in zip(old_text, new_text, strict=False))
     if changed or len(old_text) != len(new_text):
         print(f"  {after.name}: {changed} of {len(old_text)} texts differ, now {len(new_text)}")
+    if CHECK in old:
+        old, new = {CHECK: old[CHECK]}, {CHECK: new[CHECK]}
     if len(old) != len(new):
         yield f"{len(old)} columns, now {len(new)}"
         return
     for (name, a), (_, b) in zip(old.items(), new.items(), strict=True):
-        if a.shape != b.shape:
+        if name == CHECK:  # which may be in another order
+            print(f"  {len(a)} checks, now {len(b)}")
+            apart = np.abs(b[:, None] - a).min(axis=1)
+            for k in np.flatnonzero(apart > AGREE):
+                yield f"check {k}: by {apart[k]:.2g} from the nearest"
+        elif a.shape != b.shape:
             yield f"{name}: {a.shape}, now {b.shape}"
-        elif a.dtype.kind not in "fc":
-            continue
-        elif not np.allclose(a, b, rtol=0, atol=AGREE * _size(a), equal_nan=True):
-            worst = np.nanmax(np.abs(a - b)) / _size(a)
-            yield f"{name}: differs by {worst:.2g} of its largest (may by {AGREE:g})"
+        elif a.dtype.kind in "fc":
+            size = float(np.abs(a[np.isfinite(a)]).max(initial=1e-300))
+            if not np.allclose(a, b, rtol=0, atol=AGREE * size, equal_nan=True):
+                worst = np.nanmax(np.abs(a - b)) / size
+                yield f"{name}: differs by {worst:.2g} of its largest (may by {AGREE:g})"
 
 
-def _changed_checks(old: np.ndarray, new: np.ndarray) -> Iterator[str]:
-    """Yield checks whose value is not among the old checks, which may be in another order."""
-    print(f"  {len(old)} checks, now {len(new)}")
-    apart = np.abs(new[:, None] - old).min(axis=1)
-    yield from (
-        f"check {k}: by {apart[k]:.2g} from the nearest" for k in np.flatnonzero(apart > AGREE)
-    )
-
-
-def _size(values: np.ndarray) -> float:
-    finite = np.abs(values[np.isfinite(values)])
-    return float(finite.max(initial=1e-300))
-
-
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench.frozen", description=__doc__)
     parser.add_argument("what", choices=("write", "compare"))
     parser.add_argument("folder", type=Path, metavar="DIR")
@@ -163,26 +145,23 @@ def main() -> None:
     given = parser.parse_args()
     folder = given.folder.resolve()
     scenes = folder / "scenes"
-    if given.what == "write" and not scenes.exists():
+    writes, failed = given.what == "write", 0
+    if writes and not scenes.exists():
         write_scenes(scenes)
-    failed = 0
     with tempfile.TemporaryDirectory() as place:
         for name, (command, files) in parts().items():
             if not name.startswith(given.only):
                 continue
             print(name, flush=True)
-            cache = str(Path(place, "cache"))
-            results = folder if given.what == "write" else Path(place)
-            out = run(name, command, scenes, results, cache)
-            if given.what == "compare":
-                for file in files:
-                    for difference in differences(folder / out.name / file, out / file):
-                        failed += 1
-                        print(f"  {file}: {difference}", flush=True)
-    if given.what == "compare":
+            out = run(name, command, scenes, folder if writes else Path(place), f"{place}/cache")
+            for file in () if writes else files:
+                for difference in differences(folder / out.name / file, out / file):
+                    failed += 1
+                    print(f"  {file}: {difference}", flush=True)
+    if not writes:
         print(f"{failed} differences" if failed else "all numbers agree")
-        sys.exit(bool(failed))
+    return int(bool(failed))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

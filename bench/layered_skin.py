@@ -1,17 +1,18 @@
-"""Layered skin fitted to published waves: `python -m bench.layered_skin [--presets]`.
+"""Layered skin fitted to published waves.
 
 Shear moduli, thicknesses and one loss for all layers are fitted, within published ranges, to phase
 speeds, 1/e lengths and decay exponents over frequency. The squared logarithms of the factors are
-averaged within a set and summed over the sets. `--presets` skips the fits.
+averaged within a set and summed over the sets.
 """
 
-import sys
+import argparse
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from bench import table
 from simple_model import Material
 from skinwave.bodies import BODIES, Body
 from skinwave.bodies.parts import solid_of
@@ -141,25 +142,27 @@ def fit(preset: str, sets: Sequence[Published]) -> dict[str, float]:
     return named(min(found, key=lambda each: each.cost).x)
 
 
-def main(*arguments: str) -> None:
-    """Print the numbers of both presets and fits, and the median factor of each set."""
+def main(presets: bool) -> None:
+    """Print the numbers of both presets and of fits, and the median factor of each set."""
     for preset, ranges in RANGES.items():
         sets = [each for each in WAVES if preset in each.bodies]
         numbers = {"preset": values_of(BODIES[preset], ranges)}
-        if "--presets" not in arguments:
+        if not presets:
             numbers["fit"] = fit(preset, [each for each in sets if preset in each.fitted])
         print(f"\n{preset}: shear moduli in Pa, thicknesses in m, loss in s")
-        print(f"{'':30}{'range':>22}", *(f"{name:>12}" for name in numbers))
+        row = table("", "range", *numbers)
         for name, each in ranges.items():
-            cells = (f"{values[name]:>12.3g}" for values in numbers.values())
-            print(f"{name:30}{f'{each.low:.3g} to {each.high:.3g}':>22}", *cells)
+            row(name, f"{each.low:.3g} to {each.high:.3g}",
+                *(f"{values[name]:.3g}" for values in numbers.values()))  # fmt: skip
         bodies = [with_values(BODIES[preset], values) for values in numbers.values()]
         curves = [leading_wave(body, GRID) for body in bodies]
         for each in sets:
             logs = [misses(*found, each) for found in zip(bodies, curves, strict=True)]
             factors = [np.exp(np.median(np.where(np.isnan(x), NO_WAVE, np.abs(x)))) for x in logs]
-            print(f"{each.name:30}{'median factor':>22}", *(f"{x:>12.2f}" for x in factors))
+            row(each.name, "median factor", *(f"{x:.2f}" for x in factors))
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, prog="python -m bench.layered_skin")
+    parser.add_argument("--presets", action="store_true", help="skip the fits")
+    main(parser.parse_args().presets)

@@ -1,12 +1,10 @@
 """Response times of the live page in chromium: from a key to pixels, and to a changed body.
 
-    python -m bench.live [COUNT] [BODY ...]     # by default 20 and skin-slab, paper-sheet
-
 A key moves a slider by one step. The time ends one frame after the spectrum has changed.
 """
 
+import argparse
 import re
-import sys
 import tempfile
 import threading
 import time
@@ -16,6 +14,7 @@ from typing import Any
 
 from playwright.sync_api import sync_playwright
 
+from bench import table, timed
 from skinwave.live.html_file import data_of, page
 from skinwave.live.serve import Server
 
@@ -37,10 +36,16 @@ KEY = """async ({ label, down }) => {
 }"""
 
 
-def line(name: str, times: list[float]) -> str:
-    """Return a row: median and 95th percentile of times in ms."""
+def statistics(times: list[float]) -> tuple[str, str, str]:
+    """Return median, 95th percentile and number of times in ms."""
     high = quantiles(times, n=20)[-1] if len(times) > 1 else times[0]
-    return f"{name:<48}{median(times):8.0f} ms{high:8.0f} ms{len(times):6d}"
+    return f"{median(times):.0f} ms", f"{high:.0f} ms", f"{len(times)}"
+
+
+def opened(tab: Any, address: str) -> None:
+    """Open a live page, and wait until it shows numbers."""
+    tab.goto(address)
+    tab.locator(".tile").first.wait_for()
 
 
 def keys(tab: Any, count: int) -> dict[str, tuple[list[float], float]]:
@@ -75,11 +80,9 @@ def body_changes(tab: Any, count: int) -> list[float]:
     return found
 
 
-def main() -> None:
+def main(count: int, bodies: list[str]) -> None:
     """Measure and print the times."""
-    count = int(sys.argv[1]) if sys.argv[1:] else 20
-    bodies = sys.argv[2:] or ["skin-slab", "paper-sheet"]
-    print(f"{'':<48}{'median':>11}{'95 %':>11}{'of':>6}")
+    row = table("", "median", "95 %", "of", "CPU")
     with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for body in bodies:
@@ -87,22 +90,24 @@ def main() -> None:
             file = Path(folder, f"{body}.html")
             file.write_text(page(data), encoding="utf-8")
             tab = browser.new_page(viewport={"width": 1280, "height": 800})
-            began = time.perf_counter()
-            tab.goto(file.as_uri())
-            tab.locator(".tile").first.wait_for()
-            print(line(f"{body}: page ready", [1e3 * (time.perf_counter() - began)]))
+            row(
+                f"{body}: page ready", *statistics([1e3 * timed(opened, tab, file.as_uri())[1]]), ""
+            )
             for label, (times, cpu) in keys(tab, count).items():
-                print(line(f"{body}: {label}, key to pixels", times), f"   CPU {cpu:.0f} ms")
+                row(f"{body}: {label}, key to pixels", *statistics(times), f"{cpu:.0f} ms")
             with Server() as server:
                 server.show(data)
                 threading.Thread(target=server.serve_forever, daemon=True).start()
-                tab.goto(server.address)
-                tab.locator(".tile").first.wait_for()
-                print(line(f"{body}: change of modulus", body_changes(tab, count // 2)))
+                opened(tab, server.address)
+                times = body_changes(tab, count // 2)
+                row(f"{body}: change of modulus", *statistics(times), "")
                 server.shutdown()
             tab.close()
         browser.close()
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__, prog="python -m bench.live")
+    parser.add_argument("count", type=int, nargs="?", default=20, help="number of keys")
+    parser.add_argument("bodies", nargs="*", default=["skin-slab", "paper-sheet"])
+    main(**vars(parser.parse_args()))

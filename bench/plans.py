@@ -1,35 +1,21 @@
-"""Errors and costs of plans: `python -m bench.plans stated|cost [N] [SEED]` on random scenes, and
-`python -m bench.plans sheets` on sheets that stretch.
+"""Errors and costs of plans: `stated` and `cost` on random scenes, `sheets` on those that stretch.
 
-`stated`: the error of the mesh that the plan of `fem` states, on scenes of `bench.agreement` with
-solid bodies without absorbing sides, and the true error, by elements of half the size on the
-planned body. A scene fails if its true error is more than 1.1 times the stated one. Scenes that
-take minutes are left out.
-
-`cost`: the error of the planned response against fine elements (0.7 of the default size, absorbing
-sides twice as far away), and its time over that of the cheapest candidate within the tolerance,
-which is not known beforehand, without and with the time of planning.
-
-`sheets`: the time of the lines of the load; the times of the rest of a plan, of the response and of
-its map, over that of one run with the fewest modes in the longest steps; and the error of steps and
-modes, stated and true. The reference has 170 modes. It extrapolates from steps of a half and a
-quarter of the longest with 120 modes.
+bench/README.md explains each table.
 """
 
+import argparse
 import os
-import sys
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import count
+from itertools import count, islice
 
 import numpy as np
 
-from bench.agreement import TooSlow, limited, table
-from fem import Material
-from simple_model import MovingPressure, Response, Statement, Tacton, Trajectory
-from simple_model.layers.material import from_young
+from bench import table, timed
+from bench.agreement import TooSlow, limited, random_scene
+from bench.costs import PAPER, circle
+from simple_model import Statement
 from skinwave.bodies.sizes import default_size
 from skinwave.models import plate_modes
 from skinwave.models.options import SolveOptions, sample_times
@@ -38,10 +24,10 @@ from skinwave.models.reduced import answer, reduce_scene
 from skinwave.models.relative_change import relative_changes
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import about_its_rest
-from skinwave.planning.simulate import compute
+from skinwave.planning.simulate import compute, solve
 from skinwave.scene.file import from_table, loads
-from skinwave.scene.scene import Body, Scene
-from skinwave.typing import Floats
+from skinwave.scene.scene import Scene
+from skinwave.typing import Array, Floats
 
 MOST = 1.1  # times the stated error
 SLOWEST = 20.0  # s of CPU time of a plan or a reference: slower scenes are left out
@@ -49,28 +35,42 @@ REFERENCE = 1e-4  # relative error of the reduction of a reference
 FINEST = 0.7  # of the default element size
 COARSER = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
 TOLERANCES = (0.03, 0.05, 0.10, 0.20)
-SCENES = 20
 MOST_MODES = 120, 170  # of references of sheets, in the shortest and in the longest steps
-AM = "am_frequency_hz = 140\nduration_s = 0.5"
-CIRCLE = "shape = 'circle'\nsize_mm = 20\nspeed_m_per_s = 12"
-SHEETS = {  # Tacton and body
-    "paper sheet, AM 140 Hz": (f"{AM}\n{CIRCLE}", "preset = 'paper-sheet'"),
-    "AM 71 Hz": ("am_frequency_hz = 71\nduration_s = 0.5", "preset = 'paper-sheet'"),
-    "twice the pressure": (
-        f"{AM}\n{CIRCLE}\n[focus]\npeak_pressure_pa = 100",
-        "preset = 'paper-sheet'",
+SHEETS = {
+    "paper sheet, AM 140 Hz": circle(PAPER),
+    "AM 71 Hz": circle(PAPER, am_frequency_hz=71, shape="point"),
+    "twice the pressure": circle("[focus]\npeak_pressure_pa = 100\n" + PAPER),
+    "loose sheet": circle("[body]\npreset = 'paper-sheet-loose'"),
+    "A5 with tension, 0.3 s": circle(
+        "[body]\npreset = 'a5-sheet'\nmounting = {tension_x_n_per_m = 49, tension_y_n_per_m = 15}",
+        duration_s=0.3,
     ),
-    "loose sheet": (f"{AM}\n{CIRCLE}", "preset = 'paper-sheet-loose'"),
-    "A5 with tension, 0.3 s": (
-        f"am_frequency_hz = 140\nduration_s = 0.3\n{CIRCLE}",
-        "preset = 'a5-sheet'\n[body.mounting]\ntension_x_n_per_m = 49\ntension_y_n_per_m = 15",
-    ),
-    "two foci with a rhythm, 0.4 s": (
-        f"duration_s = 0.4\n{CIRCLE}\nfoci = [0.0, 0.5]\n[tacton.rhythm]\n"
-        "pulses_ms = [[100, 50], [40, 110]]",
-        "preset = 'paper-sheet'",
+    "two foci with a rhythm, 0.4 s": circle(
+        PAPER, duration_s=0.4, am_frequency_hz=0, foci=[0.0, 0.5],
+        rhythm={"pulses_ms": [[100, 50], [40, 110]]},
     ),
 }  # fmt: skip
+
+
+def scenes(seed: int, suits: Callable[[Scene], bool]) -> Iterator[tuple[int, Scene, float]]:
+    """Yield random scenes that suit, with their numbers and tolerances."""
+    for k in count():
+        try:
+            scene = from_table(random_scene(k, seed))
+        except ValueError:  # refused
+            continue
+        if suits(scene):
+            yield k, scene, TOLERANCES[k % len(TOLERANCES)]
+
+
+def is_flat(scene: Scene) -> bool:
+    """Return whether the body of a scene is a slab or a sheet, under a pressure."""
+    return scene.body.kind in ("slab", "sheet") and scene.load.kind == "pressure"
+
+
+def error(found: Array, expected: Array) -> float:
+    """Return the relative error of waveforms (t, p) at the worst probe."""
+    return float(relative_changes(found - expected, expected).max())
 
 
 def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> tuple[float, float]:
@@ -86,148 +86,79 @@ def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> t
     finer = SolveOptions(h=chosen.h / 2, progress=limited(SLOWEST))
     fine = reduce_scene(planned_scene, finer, symmetry=chosen.symmetry, reduction=REFERENCE)
     better = answer(fine, planned_scene).values
-    stated, true = (about_its_rest(scene, each) for each in (planned.values, better))
     own = [part for part in chosen.statement.parts if part.name in ("mesh", "reduction")]
-    error = Statement(parts=tuple(own)).error
-    return error, float(relative_changes(true - stated, true).max())
+    true = error(*(about_its_rest(scene, each) for each in (planned.values, better)))
+    return Statement(parts=tuple(own)).error, true
 
 
-def check_stated_errors(number: int, seed: int) -> int:
-    """Print a table of scenes with solid bodies, and return how many fail."""
-    done = failed = 0
-    ratios: list[float] = []
-    print("scene, kind, layers, base and sides | tolerance | stated | true | true over stated")
-    for k in count():
-        if done == number:
-            break
-        tolerance = TOLERANCES[k % 3]
-        try:
-            scene = from_table(table(k, seed))
+def stated(number: int, seed: int) -> None:
+    """Print the stated and the true error of scenes with solid bodies."""
+
+    def suits(scene: Scene) -> bool:
+        body = scene.body
+        return body.kind != "sheet" and np.isfinite(body.depth) and body.sides != "absorbing"
+
+    def errors() -> Iterator[tuple[float, float]]:
+        for k, scene, tolerance in scenes(seed, suits):
+            try:
+                found, true = stated_and_true(scene, tolerance)
+            except (ValueError, TooSlow):  # refused, or too large
+                continue
             body = scene.body
-            if body.kind == "sheet" or np.isinf(body.depth) or body.sides == "absorbing":
-                raise ValueError("no elements, or too many")
-            error, true = stated_and_true(scene, tolerance)
-        except (ValueError, TooSlow):  # refused, or too large
-            continue
-        ratios.append(error / true)
-        done += 1
-        failed += true > MOST * error
-        row = (100 * tolerance, 100 * error, 100 * true, true / error)
-        print(k, body.kind, len(body.layers), body.base, body.sides,
-              "| {:g} % | {:.2f} % | {:.2f} % | {:.2f}".format(*row), flush=True)  # fmt: skip
-    low, middle, high = np.quantile(ratios, [0.1, 0.5, 0.9])
-    print(f"{failed} of {number} fail; stated over true error {middle:.2f} in the median, "
-          f"{low:.2f} to {high:.2f} in eight of ten")  # fmt: skip
-    return failed
+            row(k, body.kind, len(body.layers), f"{body.base}, {body.sides}", f"{tolerance:.0%}",
+                f"{found:.2%}", f"{true:.2%}", f"{true / found:.2f}")  # fmt: skip
+            yield found, true
+
+    row = table("scene", "kind", "layers", "base, sides", "limit", "stated", "true", "ratio")
+    found, true = np.transpose([*islice(errors(), number)])
+    low, middle, high = np.quantile(found / true, [0.1, 0.5, 0.9])
+    print(f"{(true > MOST * found).sum()} of {number} fail; stated over true error {middle:.2f} "
+          f"in the median, {low:.2f} to {high:.2f} in eight of ten")  # fmt: skip
 
 
-def scene(seed: int) -> tuple[Scene, float]:
-    """Return a random scene and a tolerance."""
-    pick = np.random.default_rng(seed)
-    shape = pick.choice(["point", "line", "circle", "square"])
-    size = float(pick.uniform(6e-3, 20e-3))
-    path = Trajectory(shape=str(shape), size=size, speed=float(pick.uniform(4, 14)))
-    am = float(pick.choice([0.0, pick.uniform(60, 240)]))
-    tacton = Tacton(am_frequency=am if shape != "point" else max(am, 80.0), duration=0.3,
-                    trajectory=path)  # fmt: skip
-    if pick.random() < 0.4:
-        side = float(pick.uniform(0.06, 0.12))
-        paper = from_young(density=800, young=float(pick.uniform(2e9, 6e9)), poisson=0.3,
-                           loss_factor=float(pick.uniform(0.02, 0.08)))  # fmt: skip
-        body = Body(
-            kind="sheet", material=paper, width=side, height=side, depth=1e-4,
-            base="free", sides="clamped",
-        )  # fmt: skip
-    else:
-        skin = Material(
-            density=1000, shear_modulus=float(pick.uniform(8e3, 50e3)), poisson=0.499,
-            viscosity=float(pick.uniform(3, 10)),
-        )  # fmt: skip
-        body = Body(
-            kind="slab", material=skin, width=0.05, height=0.05,
-            depth=float(pick.uniform(8e-3, 15e-3)),
-            sides=str(pick.choice(["absorbing", "clamped", "free"])),
-        )  # fmt: skip
-    probes = tuple((float(x), 0.0) for x in (0.0, 0.005, 0.010))
-    pressure = MovingPressure(tacton=tacton)
-    drawn = Scene(name=f"random {seed}", pressure=pressure, body=body, probes=probes)
-    return drawn, float(pick.choice(TOLERANCES))
+def cheapest(scene: Scene, tolerance: float, reference: Array) -> tuple[str, float]:
+    """Return the first of the candidates, by rising cost, within the tolerance, and its seconds."""
+    h = default_size(scene.body)
+    candidates = [("fem", {"h": h * ratio}) for ratio in COARSER]
+    if scene.body.of_kind.is_layer:
+        candidates[:0] = [("flat-body-harmonic", {}), ("flat-body", {})]
+    for model, options in candidates:
+        response, seconds = timed(compute, scene, model, **options)
+        if error(response.values, reference) <= tolerance:
+            return model + "".join(f", {1e3 * v:.1f} mm" for v in options.values()), seconds
+    return "none", np.inf
 
 
-def error(candidate: Response, reference: Response) -> float:
-    """Return the relative waveform error at the worst probe; a point kernel is scaled to fit."""
-    u, v = candidate.displacement, reference.displacement
-    if not candidate.record.of_body:
-        u = u * (u * v).sum() / (u * u).sum()
-    return float((np.linalg.norm(u - v, axis=0) / np.linalg.norm(v, axis=0)).max())
+def cost(number: int, seed: int) -> None:
+    """Print the error and the time of planned responses, and of the cheapest candidate."""
 
+    def verdicts() -> Iterator[tuple[bool, bool, bool]]:
+        for k, scene, tolerance in scenes(seed, is_flat):
+            body = scene.body
+            far = replace(body, width=2 * body.width, height=2 * body.height)
+            fine = replace(scene, body=far) if body.sides == "absorbing" else scene
+            try:
+                h, progress = FINEST * default_size(body), limited(SLOWEST)
+                reference = compute(fine, "fem", h=h, progress=progress).values
+                chosen, planning = timed(plan, scene, SolveOptions(tolerance=tolerance))
+            except (ValueError, TooSlow):  # refused, or too large
+                continue
+            response, seconds = timed(solve, scene, chosen)
+            if chosen.prepared:  # the time of a reduction during planning counts for the response
+                seconds, planning = seconds + chosen.seconds, planning - chosen.seconds
+            wrong = error(response.values, reference)
+            name, least = cheapest(scene, tolerance, reference)
+            ratios = seconds / least, (seconds + planning) / least
+            row(k, f"{body.kind}, {body.sides}", f"{tolerance:.0%}", f"{wrong:.2%}", chosen.model,
+                f"{seconds:.1f} s", f"{planning:.1f} s", name, f"{least:.1f} s",
+                *(f"{each:.1f}" for each in ratios))  # fmt: skip
+            yield wrong <= tolerance, ratios[0] <= 5, ratios[1] <= 5
 
-def planned_response(scene: Scene, tolerance: float) -> tuple[str, Response, float, float]:
-    """Return the planned model, its response, and the seconds of the response and of planning.
-
-    The time of a reduction during planning counts for the response.
-    """
-    started = time.perf_counter()
-    chosen = plan(scene, SolveOptions(tolerance=tolerance))
-    planning, started = time.perf_counter() - started, time.perf_counter()
-    if chosen.prepared:
-        response, prepared = answer(chosen.prepared, scene), chosen.seconds
-    else:
-        planned = replace(scene, body=chosen.body)
-        response, prepared = compute(planned, chosen.model, h=chosen.h), 0.0
-    seconds = time.perf_counter() - started + prepared
-    return chosen.model, response, seconds, planning - prepared
-
-
-def assess(seed: int) -> tuple[bool, bool, bool]:
-    """Print a row; return whether the planned response is within the tolerance, and whether its
-    time is at most five times that of the cheapest, without and with planning.
-    """
-    drawn, tolerance = scene(seed)
-    body, h = drawn.body, default_size(drawn.body)
-    far = drawn
-    if body.sides == "absorbing":
-        far = replace(drawn, body=replace(body, width=2 * body.width, height=2 * body.height))
-    reference = compute(far, "fem", h=FINEST * h)
-    model, planned, seconds, planning = planned_response(drawn, tolerance)
-    planned_error = error(planned, reference)
-    good = []
-    candidates = [("point-kernel", {}), *(("fem", {"h": h * ratio}) for ratio in COARSER)]
-    if body.of_kind.is_layer:
-        candidates[1:1] = [("flat-body-harmonic", {}), ("flat-body", {})]
-    for other, model_options in candidates:
-        started = time.perf_counter()
-        response, cost = compute(drawn, other, **model_options), time.perf_counter() - started
-        if error(response, reference) <= tolerance:
-            good.append((cost, other, model_options))
-            break  # by rising cost: the first within the tolerance is the cheapest
-    cost, best, model_options = min(good, default=(np.inf, "none", {}))
-    name = best + "".join(f" {1e3 * v:.1f} mm" for v in model_options.values())
-    shape, am = drawn.tacton.trajectory.shape, drawn.tacton.am_frequency
-    print(
-        f"{seed:>3} {body.kind:<6}{body.sides:<10} {shape:<7}{am:5.0f} Hz"
-        f" {100 * tolerance:5.0f} % {100 * planned_error:7.2f} %  {model:<18}{seconds:6.1f} s"
-        f"{planning:6.1f} s  {name:<18}{cost:6.1f} s {seconds / cost:6.1f}"
-        f" {(seconds + planning) / cost:6.1f}",
-        flush=True,
-    )
-    return planned_error <= tolerance, seconds <= 5 * cost, seconds + planning <= 5 * cost
-
-
-def cost(number: int, first: int) -> None:
-    """Print a table of random scenes."""
-    print("    body             path       f_AM  limit   error   chosen                   planning"
-          "  cheapest in tolerance    ratio   with")  # fmt: skip
-    counts = np.array([assess(first + k) for k in range(number)]).sum(axis=0)
+    row = table("scene", "kind, sides", "limit", "error", "chosen", "time", "planning",
+                "cheapest in tolerance", "time", "ratio", "with")  # fmt: skip
+    counts = np.sum([*islice(verdicts(), number)], axis=0)
     print(f"{counts[0]} of {number} within the tolerance; {counts[1]} at no more than five times "
           f"the cheapest, {counts[2]} with planning")  # fmt: skip
-
-
-def seconds_of(call: Callable[..., object], *arguments: object) -> float:
-    """Return the time of a call in seconds."""
-    started = time.perf_counter()
-    call(*arguments)
-    return time.perf_counter() - started
 
 
 def _added(drawn: Scene, count: int, steps: int) -> Floats:
@@ -236,38 +167,36 @@ def _added(drawn: Scene, count: int, steps: int) -> Floats:
     return plate_modes.stretching_in_run(drawn, sample_times(drawn), run)
 
 
-def assess_sheets() -> None:
-    """Print a table of sheets that stretch."""
-    print(f"{'scene':<31}  lines  one run   plan  response  map   stated    true")
-    for name, (tacton, body) in SHEETS.items():
-        drawn = loads(f"[tacton]\n{tacton}\n[body]\n{body}")
+def sheets() -> None:
+    """Print costs and errors of sheets that stretch."""
+    row = table("scene", "lines", "one run", "plan", "response", "map", "stated", "true")
+    tolerance = SolveOptions().tolerance
+    for name, text in SHEETS.items():
+        drawn = loads(text)
         times = sample_times(drawn)
         steps = len(times) - 1
         added = partial(_added, drawn)
-        lines = seconds_of(plate_modes.steady_lines, drawn)
-        planning = seconds_of(plan, drawn, SolveOptions())
-        one = seconds_of(added, ACCURACY.counts[0], steps - 1)  # the plate is known from the plan
-        answered = seconds_of(compute, drawn, STRETCHED.name)
-        mapped = seconds_of(sheet_motion, drawn, SolveOptions().tolerance)
-        found = plate_modes.solve_stretching(
-            drawn, len(times), float(times[1]), SolveOptions().tolerance, None
-        )
+        lines = timed(plate_modes.steady_lines, drawn)[1]
+        planning = timed(plan, drawn, SolveOptions())[1]
+        one = timed(added, COUNTS[0], steps - 1)[1]  # the plate is known from the plan
+        answered = timed(compute, drawn, STRETCHED.name)[1]
+        mapped = timed(sheet_motion, drawn, tolerance)[1]
+        found = plate_modes.stretched(drawn, len(times), float(times[1]), tolerance, None)
         fine, coarse = (added(MOST_MODES[0], n * steps) for n in (4, 2))
         true = fine + (fine - coarse) / 3 + added(MOST_MODES[1], steps)
         true -= added(MOST_MODES[0], steps)
         wrong = float(relative_changes(found.values - true, found.linear + true).max())
-        print(
-            f"{name:<31}{lines:5.1f} s{one:7.2f} s{planning / one:7.1f}{answered / one:9.1f}"
-            f"{mapped / one:6.1f}{100 * found.error.error:7.2f} %{100 * wrong:6.2f} %",
-            flush=True,
-        )
+        row(name, f"{lines:.1f} s", f"{one:.2f} s",
+            *(f"{each / one:.1f}" for each in (planning, answered, mapped)),
+            f"{found.error.error:.2%}", f"{wrong:.2%}")  # fmt: skip
 
 
 if __name__ == "__main__":
     os.environ["SKINWAVE_CACHE"] = ""
-    if sys.argv[1] == "sheets":
-        assess_sheets()
-        sys.exit()
-    table_name, *numbers = sys.argv[1:]
-    number, seed = (*map(int, numbers), *(SCENES, 0)[len(numbers) :])
-    {"stated": check_stated_errors, "cost": cost}[table_name](number, seed)
+    tables = {"stated": stated, "cost": cost, "sheets": sheets}
+    parser = argparse.ArgumentParser(description=__doc__, prog="python -m bench.plans")
+    parser.add_argument("table", choices=tables)
+    parser.add_argument("number", type=int, nargs="?", default=20, help="number of random scenes")
+    parser.add_argument("seed", type=int, nargs="?", default=0)
+    given = parser.parse_args()
+    tables[given.table](*([] if given.table == "sheets" else [given.number, given.seed]))

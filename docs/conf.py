@@ -34,6 +34,7 @@ extensions = [
     "mathml",  # formulas without a script
     "generated",  # pages from the code, and links to files outside docs/
     "docstrings",  # numpydoc style
+    "outputs",  # what blocks of code print and draw
     "live_page",  # the page that computes
 ]
 exclude_patterns = ["_build", "extension", "gallery/*.py", "sg_execution_times.rst",
@@ -60,7 +61,8 @@ sphinx_gallery_conf = {
     "examples_dirs": "../examples/gallery",
     "gallery_dirs": "gallery",
     "filename_pattern": r".*\.py$",
-    "image_scrapers": ("pyvista", "matplotlib"),
+    "image_scrapers": ("thumbnails.scraper",),
+    "thumbnail_size": (440, 308),
     "abort_on_example_error": True,
     "download_all_examples": False,
     "within_subsection_order": "FileNameSortKey",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import skinwave
-from bench.agreement import Outcome, Pair, outcome, table
+from bench.agreement import Outcome, Pair, outcome, random_scene
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.commands.cli import main
 from skinwave.models import named
@@ -105,7 +105,7 @@ def test_commands_write_what_python_returns(simulated, tmp_path, monkeypatch, ca
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_models_agree_within_their_stated_errors(number):
-    found = outcome(number, table(number, SEED), MODELS, slowest=math.inf)
+    found = outcome(number, random_scene(number, SEED), MODELS, slowest=math.inf)
     assert not found.faults
     assert not found.disagreements, found.scene
 
@@ -113,5 +113,5 @@ def test_models_agree_within_their_stated_errors(number):
 def test_a_difference_above_the_stated_errors_is_reported():
     """A difference of 3 % between responses with a stated error of 1 % each."""
     found = Outcome(0, {})
-    found.pairs = [Pair(("a", "b"), 0.03, 0.02), Pair(("a", "c"), 0.02, 0.02)]
+    found.pairs = [Pair(("a", "b"), 0.03, (0.01, 0.01)), Pair(("a", "c"), 0.02, (0.01, 0.01))]
     assert [pair.models for pair in found.disagreements] == [("a", "b")]

@@ -9,7 +9,8 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from test_how_tos import WRITTEN  # whose blocks are run there, one after the other
+import pyvista
+from test_how_tos import WRITTEN, example  # whose blocks are run there, one after the other
 
 from skinwave import SkinwaveWarning, dumps, loads
 from skinwave.commands import cli
@@ -17,7 +18,6 @@ from skinwave.report.renderer import renderer
 
 ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
-OTHERS = [page for page in PAGES if page.stem not in WRITTEN]
 PACKAGES = ("fem", "meshes", "simple_model", "skinwave")
 MODULES = sorted(
     path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".")
@@ -28,9 +28,14 @@ MODULES = sorted(
 NOTEBOOK = ROOT / "examples/notebook.ipynb"
 
 
-def code_blocks(language, pages=PAGES):
+def code_blocks(language, without_how_tos=False):
     pattern = re.compile(rf"```{language}\n(.*?)```", re.DOTALL)
-    found = {page: pattern.findall(page.read_text("utf-8")) for page in pages}
+    found = {}
+    for page in PAGES:
+        text = page.read_text("utf-8")
+        if without_how_tos and page.stem in WRITTEN:
+            text = text.replace(example(text), "")
+        found[page] = pattern.findall(text)
     return {page: texts for page, texts in found.items() if texts}
 
 
@@ -69,7 +74,8 @@ def test_every_scene_that_the_documentation_shows_is_one():
 def test_commands_are_understood():
     for page, texts in code_blocks("sh").items():
         for text in texts:
-            lines = [line for line in text.splitlines() if line.startswith("skinwave ")]
+            lines = text.replace("\\\n", "").splitlines()
+            lines = [line for line in lines if line.startswith("skinwave ")]
             for line in lines:
                 words = shlex.split(line, comments=True)[1:]
                 assert cli.parser().parse_args(cli._join_up_option(words)).command, page
@@ -77,16 +83,34 @@ def test_commands_are_understood():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", code_blocks("python", OTHERS), ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", code_blocks("python", True), ids=lambda page: page.stem)
 def test_python_runs(page, monkeypatch, capsys):
-    if page.stem == "notebooks" and not renderer().is_available:
-        pytest.skip("nothing draws films here")
+    if page.stem in ("notebooks", "2-kernel-and-waves") and not renderer().is_available:
+        pytest.skip("nothing draws in three dimensions here")
     monkeypatch.chdir(ROOT)
-    for text in code_blocks("python", OTHERS)[page]:
+    monkeypatch.setattr(pyvista, "OFF_SCREEN", True)  # no windows
+    for text in code_blocks("python", True)[page]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SkinwaveWarning)  # the point kernel has no propagation
             exec(compile(text, str(page), "exec"), {})
         assert capsys.readouterr().out
+
+
+def test_lines_of_code_fit_the_column_of_the_site():
+    texts = [page.read_text("utf-8") for page in (*PAGES, ROOT / "bench/README.md")]
+    fence = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+    found = [block for text in texts for block in fence.findall(text)]
+    blocks = [block for language, block in found if language != "{raw} html"]
+    assert len(blocks) > 80
+    assert [line for block in blocks for line in block.splitlines() if len(line) > 100] == []
+
+
+def test_outputs_follow_the_code_of_the_tutorial():
+    for page in sorted((ROOT / "docs/tutorial").glob("?-*.md")):
+        text = page.read_text("utf-8")
+        pieces = re.split(r"```python\n.*?```\n", text, flags=re.DOTALL)[1:]
+        assert pieces
+        assert all(piece.startswith("\n<!-- output") for piece in pieces), page
 
 
 def test_scripts_of_the_gallery_are_short_and_assert_a_number():

@@ -11,26 +11,33 @@ from skinwave import SkinwaveWarning
 from skinwave.commands import cli
 
 DOCS = Path(__file__).parents[2] / "docs"
-WRITTEN = {
+WRITTEN = {  # pages, or their sections "Example", and files that they write
     "labelled-data": ("tactons.csv",),
-    "fit-a-vibrometer": (
+    "fit": (
         "palm.csv",
         "inspected/index.html",
         "fitted/scene.toml",
         "fitted/estimates.csv",
     ),
-    "own-sheet": ("sheet/lines.csv", "clips/rows"),
+    "sheets": ("sheet/lines.csv", "clips/rows"),
     "silicone-disc": ("disc/responses.npz", "disc.gif", "disc.pvd"),
     "fingertip": (),
-    "bands": ("skin/percentiles.csv", "skin/samples.csv"),
+    "uncertainty": ("skin/percentiles.csv", "skin/samples.csv"),
     "own-laws": (),
-    "supplement": ("supplement/record.json", "again/record.json"),
+    "results": ("supplement/record.json", "again/record.json"),
 }
 LONGEST = 30  # lines of code
 
 
+def example(text):
+    """The section "Example" of a page, or the whole page."""
+    _, is_there, rest = text.partition("\n## Example\n")
+    return rest.partition("\n## ")[0] if is_there else text
+
+
 def blocks(page):
-    found = re.findall(r"```(\w+)\n(.*?)```", (DOCS / f"{page}.md").read_text("utf-8"), re.DOTALL)
+    text = example((DOCS / f"{page}.md").read_text("utf-8"))
+    found = re.findall(r"```(\w+)\n(.*?)```", text, re.DOTALL)
     return sorted(found, key=lambda block: block[0] != "toml")
 
 
@@ -40,7 +47,7 @@ def run(language, text):
     elif language == "python":
         exec(compile(text, "how-to", "exec"), {})
     else:
-        for line in text.splitlines():
+        for line in text.replace("\\\n", "").splitlines():
             quiet = ["--quiet"] * ("plan" not in line)
             assert cli.main([*shlex.split(line)[1:], *quiet]) == 0
 

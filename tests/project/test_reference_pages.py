@@ -3,10 +3,13 @@
 import importlib.util
 import re
 import sys
+from base64 import b64decode
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from skinwave import models
 from skinwave.bodies import BODIES, KINDS
@@ -38,6 +41,37 @@ def test_every_page_asks_for_what_there_is():
         for name in generated.MARK.findall(path.read_text("utf-8"))
     }
     assert asked == generated.PAGES.keys()
+
+
+def test_blocks_of_a_page_are_followed_by_what_they_print_and_draw():
+    page = """```python
+import matplotlib.pyplot as plt
+plt.figure(figsize=(3, 2), dpi=50)
+print(6 * 7)
+```
+
+<!-- output: A picture -->
+
+```toml
+# scene.toml
+[body]
+kind = "none"
+```
+
+```sh
+skinwave plan scene.toml \\
+    --tolerance 0.02
+```
+
+<!-- output -->
+"""
+    text = loaded("outputs").with_outputs(page)
+    assert "\n42\n" in text
+    assert "point-kernel" in text
+    (data,) = re.findall(r"!\[A picture\]\(data:image/png;base64,(.*)\)", text)
+    assert Image.open(BytesIO(b64decode(data))).size == (150, 100)
+    with pytest.raises(ValueError, match="needs an alternative text"):
+        loaded("outputs").with_outputs(page.replace(": A picture", ""))
 
 
 def test_commands_are_listed_with_every_option():
