@@ -82,6 +82,11 @@ def _number(draw: random.Random, low: float, high: float) -> float:
     return float(f"{math.exp(draw.uniform(math.log(low), math.log(high))):.4g}")
 
 
+def _some(draw: random.Random, chance: float, **choices: list[Any]) -> Table:
+    """Return keys with a choice of their values, by chance."""
+    return {k: draw.choice(v) for k, v in choices.items()} if draw.random() < chance else {}
+
+
 def _point(draw: random.Random, reach: float) -> list[float]:
     return [round(draw.uniform(-reach, reach), 2) for _ in range(2)]
 
@@ -121,30 +126,24 @@ def _tacton(draw: random.Random, reach: float) -> Table:
         pulses = [[_number(draw, 5, 60), _number(draw, 1, 60)] for _ in range(draw.randint(1, 2))]
         ramp = draw.choice([0.0, 0.3]) * min(on for on, _ in pulses)
         keys["rhythm"] = {"pulses_ms": pulses, "ramp_ms": round(ramp, 3)}
-    if shape != "point" and draw.random() < 0.15:
-        keys["foci"] = draw.choice([[0.0, 0.5], [0.0, 0.25, 0.6]])
+    if shape != "point":
+        keys |= _some(draw, 0.15, foci=[[0.0, 0.5], [0.0, 0.25, 0.6]])
     return keys
 
 
 def _focus(draw: random.Random) -> Table:
     keys: Table = {"peak_pressure_pa": _number(draw, 0.001, 50)}
-    if draw.random() < 0.4:
-        keys["drive"] = draw.choice(["linear", "pressure_squared", "force_corrected"])
+    keys |= _some(draw, 0.4, drive=["linear", "pressure_squared", "force_corrected"])
     if draw.random() < 0.2:
         keys["depth_of_modulation"] = round(draw.uniform(0.1, 1), 2)
-    if draw.random() < 0.2:
-        keys["height_mm"] = draw.choice([150, 200, 250])
-    if draw.random() < 0.1:
-        keys["profile"] = "main_lobe"
-    return keys
+    keys |= _some(draw, 0.2, height_mm=[150, 200, 250])
+    return keys | ({"profile": "main_lobe"} if draw.random() < 0.1 else {})
 
 
 def _body(draw: random.Random) -> Table:
     kind = draw.choice(["slab"] * 5 + ["sheet"] * 5 + ["palm", "disc", "finger"])
-    makers: dict[str, Callable[[random.Random], Table]] = {
-        "slab": _slab, "sheet": _sheet, "palm": _palm, "disc": _disc, "finger": _finger
-    }  # fmt: skip
-    return {"kind": kind} | makers[kind](draw)
+    makers = {"slab": _slab, "sheet": _sheet}
+    return {"kind": kind} | (makers[kind](draw) if kind in makers else _other(draw, kind))
 
 
 def _skin(draw: random.Random, softest: float = 8e3, stiffest: float = 80e3) -> Any:
@@ -219,9 +218,8 @@ def _sheet(draw: random.Random) -> Table:
     }
     mounting: Table = {}
     of_air = draw.random()
-    if draw.random() < 0.5:
-        sides = [["left", "right"], ["front", "back"], ["front"], ["left", "front"]]
-        mounting["edges"] = draw.choice(sides)
+    sides = [["left", "right"], ["front", "back"], ["front"], ["left", "front"]]
+    mounting |= _some(draw, 0.5, edges=sides)
     if draw.random() < 0.3 and len(mounting.get("edges", "four")) > 1:
         mounting["support"] = "simply"
     if draw.random() < 0.3:
@@ -234,33 +232,25 @@ def _sheet(draw: random.Random) -> Table:
     return keys
 
 
-def _palm(draw: random.Random) -> Table:
-    return {
-        "size_x_mm": round(draw.uniform(36, 50), 1), "size_y_mm": round(draw.uniform(40, 55), 1),
-        "thickness_mm": round(draw.uniform(8, 13), 1), "material": _skin(draw, 15e3),
-    }  # fmt: skip
-
-
-def _disc(draw: random.Random) -> Table:
-    across = round(draw.uniform(20, 36), 1)
-    return {
-        "size_x_mm": across, "size_y_mm": across, "thickness_mm": round(draw.uniform(3, 8), 1),
-        "material": _skin(draw), "sides": draw.choice(["free", "clamped", "absorbing"]),
-    }  # fmt: skip
-
-
-def _finger(draw: random.Random) -> Table:
-    return {
-        "size_x_mm": 16.0, "size_y_mm": 25.0, "thickness_mm": 13.0, "base": "free",
-        "sides": "clamped", "regions": {"bone": "bone"}, "material": _skin(draw, 15e3),
-    }  # fmt: skip
+def _other(draw: random.Random, kind: str) -> Table:
+    if kind == "palm":
+        sizes = [round(draw.uniform(*ends), 1) for ends in ((36, 50), (40, 55), (8, 13))]
+        more: Table = {"material": _skin(draw, 15e3)}
+    elif kind == "disc":
+        across, high = round(draw.uniform(20, 36), 1), round(draw.uniform(3, 8), 1)
+        sizes, more = [across, across, high], {"material": _skin(draw)}
+        more["sides"] = draw.choice(["free", "clamped", "absorbing"])
+    else:
+        sizes = [16.0, 25.0, 13.0]
+        more = {"base": "free", "sides": "clamped", "regions": {"bone": "bone"},
+                "material": _skin(draw, 15e3)}  # fmt: skip
+    return dict(zip(("size_x_mm", "size_y_mm", "thickness_mm"), sizes, strict=True)) | more
 
 
 def _probes(draw: random.Random, body: Table, reach: float) -> Table:
     near = 0.3 if body["kind"] == "finger" else 1.0
     keys: Table = {"points_mm": [_point(draw, near * reach) for _ in range(draw.randint(1, 3))]}
-    if draw.random() < 0.4:
-        keys["quantity"] = draw.choice(["velocity", "acceleration"])
+    keys |= _some(draw, 0.4, quantity=["velocity", "acceleration"])
     if body["kind"] == "slab" and draw.random() < 0.15:
         keys["depth_mm"] = round(draw.uniform(0.2, 0.5) * min(body["thickness_mm"], 4), 2)
         keys["quantity"] = draw.choice(["displacement_z", "strain_zz", "displacement"])
@@ -292,12 +282,11 @@ class Pair:
 
     @property
     def agrees(self) -> bool:
-        """Whether the difference is within the stated errors."""
         return self.difference <= SLACK * sum(self.stated) + FLOOR
 
     def __str__(self) -> str:
-        names = map("{} ({:.2%})".format, self.models, self.stated)
-        return f"{' and '.join(names)}: {self.difference:.2%}"
+        names = " and ".join(map("{} ({:.2%})".format, self.models, self.stated))
+        return f"{names}: {self.difference:.2%}"
 
 
 @dataclass
@@ -313,7 +302,6 @@ class Outcome:
 
     @property
     def disagreements(self) -> list[Pair]:
-        """Pairs that disagree."""
         return [pair for pair in self.pairs if not pair.agrees]
 
     def __str__(self) -> str:
@@ -338,8 +326,7 @@ def outcome(
         return result
     for name in only or [each for each in models.names() if each not in KERNELS]:
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", skinwave.SkinwaveWarning)
+            with warnings.catch_warnings(category=skinwave.SkinwaveWarning, action="ignore"):
                 found = skinwave.simulate(parsed, name, TOLERANCE, limited(slowest))
             responses[name] = found
         except TooSlow:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, cg, splu, spsolve
+from scipy.sparse.linalg import LinearOperator, splu, spsolve
 from scipy.spatial import cKDTree
 
 import fem
@@ -334,7 +334,7 @@ def time_steps(
         forces, read = body.to_nodes.T @ load["forces"], load["probes"] @ body.to_nodes
         solve, factorised = timed(body.factorise, dt / 2 * lag + dt**2 / 4, free)
         u = v = np.zeros(len(free))
-        a = first_acceleration(body, forces[:, [0]].toarray().ravel(), free)
+        a = body.factorise(0.0, free)(forces[:, [0]].toarray().ravel())  # at rest
         motion, seconds = [read @ u], []
         for k in range(1, STEPS + 1):
             force, started = forces[:, [k]].toarray().ravel(), time.perf_counter()
@@ -350,15 +350,6 @@ def time_steps(
 def free_dofs(body: Assembled, facets: np.ndarray) -> np.ndarray:
     """Return which dofs of a code do not move the nodes of some facets."""
     return abs(body.to_nodes[(3 * np.unique(facets)[:, None] + range(3)).ravel()]).sum(axis=0) == 0
-
-
-def first_acceleration(body: Assembled, force: np.ndarray, free: np.ndarray) -> np.ndarray:
-    n = len(force)
-    M = LinearOperator((n, n), matvec=lambda x: np.where(free, body.M @ (free * x), x), dtype=float)
-    a, failed = cg(M, free * force, maxiter=5000)
-    if failed:
-        raise ArithmeticError("the mass matrix could not be inverted")
-    return a
 
 
 def threads(name: str) -> contextlib.AbstractContextManager[Any]:

@@ -13,10 +13,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from bench import timed
 
 ROOT = Path(__file__).parent.parent
 COPIED = ("bench", "examples", "fem", "meshes", "simple_model", "skinwave", "tests")
@@ -63,7 +65,7 @@ def outcome(fault: Fault, copy: Path) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
+    parser = argparse.ArgumentParser(prog="python -m bench.faults", description=__doc__)
     parser.add_argument("--only", metavar="NAME", help="faults whose name or file contains NAME")
     parser.add_argument("--list", action="store_true", help="print the faults, and run no test")
     given = parser.parse_args()
@@ -72,18 +74,16 @@ def main() -> None:
         for each in chosen:
             print(f"{each.name:<28}{each.file}{'' if each.applied() else '  does not apply'}")
         return
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)
         for name in COPIED:
             shutil.copytree(ROOT / name, copy / name)
         shutil.copy2(ROOT / "pyproject.toml", copy)
         for fault in chosen:
-            began = time.perf_counter()
-            result = outcome(fault, copy)
-            print(f"{fault.name:<28}{time.perf_counter() - began:4.0f} s  {result}", flush=True)
-            kind = result.split(" by ")[0]
-            counts[kind] = counts.get(kind, 0) + 1
+            result, seconds = timed(outcome, fault, copy)
+            print(f"{fault.name:<28}{seconds:4.0f} s  {result}", flush=True)
+            counts[result.split(" by ")[0]] += 1
     print(f"{len(chosen)} faults:", ", ".join(f"{n} {kind}" for kind, n in counts.items()))
 
 

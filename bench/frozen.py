@@ -14,7 +14,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -40,12 +39,12 @@ def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
 
 def write_scenes(folder: Path) -> None:
     """Write the examples, and random slabs and sheets."""
-    from bench.plans import is_flat, scenes
+    from bench.plans import each_scene, is_flat
     from skinwave.scene.file import dumps
 
     folder.mkdir(parents=True)
     texts = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.toml")}
-    for k, (_, scene, _) in enumerate(islice(scenes(0, is_flat), PLANNED)):
+    for k, scene in enumerate(each_scene(PLANNED, 0, is_flat, lambda _k, scene, _limit: scene)):
         texts[f"planned-{k:02}"] = dumps(scene)
     for name, text in texts.items():
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")

@@ -69,11 +69,10 @@ RANGES = {"palm-layers": PALM, "forearm-layers": FOREARM}
 def values_of(body: Body, names: Iterable[str]) -> dict[str, float]:
     """Return named numbers of a body, in SI."""
     solids = [*(solid_of(each.material) for each in body.layers), body.solid]
-    known = {name: solid.shear_modulus
-             for name, solid in zip((*LAYERS, "muscle"), solids, strict=True)}  # fmt: skip
-    known |= {f"{name} thickness": each.thickness
-              for name, each in zip(LAYERS, body.layers, strict=True)}  # fmt: skip
-    known |= {"depth": body.depth, "loss": body.solid.viscosity / body.solid.shear_modulus}
+    known = {"depth": body.depth, "loss": body.solid.viscosity / body.solid.shear_modulus}
+    known |= zip((*LAYERS, "muscle"), (each.shear_modulus for each in solids), strict=True)
+    for name, each in zip(LAYERS, body.layers, strict=True):
+        known[f"{name} thickness"] = each.thickness
     return {name: known[name] for name in names}
 
 
@@ -109,12 +108,8 @@ def misses(body: Body, curves: Curves, published: Published) -> Floats:
 def residuals(body: Body, sets: Sequence[Published]) -> Floats:
     """Return the logarithms of all factors, weighted so that each set counts once."""
     curves = leading_wave(body, GRID)
-    parts = []
-    for each in sets:
-        logs = misses(body, curves, each)
-        bounded = np.where(np.isnan(logs), NO_WAVE, np.clip(logs, -LARGEST, LARGEST))
-        parts.append(bounded / np.sqrt(len(logs)))
-    return np.concatenate(parts)
+    logs = [np.clip(misses(body, curves, each), -LARGEST, LARGEST) for each in sets]
+    return np.concatenate([np.nan_to_num(x, nan=NO_WAVE) / np.sqrt(len(x)) for x in logs])
 
 
 def fit(preset: str, sets: Sequence[Published]) -> dict[str, float]:
@@ -158,7 +153,7 @@ def main(presets: bool) -> None:
         curves = [leading_wave(body, GRID) for body in bodies]
         for each in sets:
             logs = [misses(*found, each) for found in zip(bodies, curves, strict=True)]
-            factors = [np.exp(np.median(np.where(np.isnan(x), NO_WAVE, np.abs(x)))) for x in logs]
+            factors = [np.exp(np.median(np.nan_to_num(np.abs(x), nan=NO_WAVE))) for x in logs]
             row(each.name, "median factor", *(f"{x:.2f}" for x in factors))
 
 

@@ -4,11 +4,13 @@ bench/README.md explains each table.
 """
 
 import argparse
+import contextlib
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import count, islice
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +34,7 @@ from skinwave.typing import Array, Floats
 MOST = 1.1  # times the stated error
 SLOWEST = 20.0  # s of CPU time of a plan or a reference: slower scenes are left out
 REFERENCE = 1e-4  # relative error of the reduction of a reference
-FINEST = 0.7  # of the default element size
+FINEST, MOST_CELLS = 0.7, 3000  # of a reference: size over the default size, and cells of that size
 COARSER = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
 TOLERANCES = (0.03, 0.05, 0.10, 0.20)
 MOST_MODES = 120, 170  # of references of sheets, in the shortest and in the longest steps
@@ -52,15 +54,21 @@ SHEETS = {
 }  # fmt: skip
 
 
-def scenes(seed: int, suits: Callable[[Scene], bool]) -> Iterator[tuple[int, Scene, float]]:
-    """Yield random scenes that suit, with their numbers and tolerances."""
-    for k in count():
-        try:
-            scene = from_table(random_scene(k, seed))
-        except ValueError:  # refused
-            continue
-        if suits(scene):
-            yield k, scene, TOLERANCES[k % len(TOLERANCES)]
+def each_scene(
+    number: int, seed: int, suits: Callable[[Scene], bool], call: Callable[[int, Scene, float], Any]
+) -> list[Any]:
+    """Return the values of a call for random scenes that suit, with their numbers and tolerances,
+    without scenes that are refused or take too long.
+    """
+
+    def values() -> Iterator[Any]:
+        for k in count():
+            with contextlib.suppress(ValueError, TooSlow):
+                scene = from_table(random_scene(k, seed))
+                if suits(scene):
+                    yield call(k, scene, TOLERANCES[k % len(TOLERANCES)])
+
+    return [*islice(values(), number)]
 
 
 def is_flat(scene: Scene) -> bool:
@@ -98,19 +106,14 @@ def stated(number: int, seed: int) -> None:
         body = scene.body
         return body.kind != "sheet" and np.isfinite(body.depth) and body.sides != "absorbing"
 
-    def errors() -> Iterator[tuple[float, float]]:
-        for k, scene, tolerance in scenes(seed, suits):
-            try:
-                found, true = stated_and_true(scene, tolerance)
-            except (ValueError, TooSlow):  # refused, or too large
-                continue
-            body = scene.body
-            row(k, body.kind, len(body.layers), f"{body.base}, {body.sides}", f"{tolerance:.0%}",
-                f"{found:.2%}", f"{true:.2%}", f"{true / found:.2f}")  # fmt: skip
-            yield found, true
+    def errors(k: int, scene: Scene, tolerance: float) -> tuple[float, float]:
+        body, (found, true) = scene.body, stated_and_true(scene, tolerance)
+        row(k, body.kind, len(body.layers), f"{body.base}, {body.sides}", f"{tolerance:.0%}",
+            f"{found:.2%}", f"{true:.2%}", f"{true / found:.2f}")  # fmt: skip
+        return found, true
 
     row = table("scene", "kind", "layers", "base, sides", "limit", "stated", "true", "ratio")
-    found, true = np.transpose([*islice(errors(), number)])
+    found, true = np.transpose(each_scene(number, seed, suits, errors))
     low, middle, high = np.quantile(found / true, [0.1, 0.5, 0.9])
     print(f"{(true > MOST * found).sum()} of {number} fail; stated over true error {middle:.2f} "
           f"in the median, {low:.2f} to {high:.2f} in eight of ten")  # fmt: skip
@@ -132,31 +135,28 @@ def cheapest(scene: Scene, tolerance: float, reference: Array) -> tuple[str, flo
 def cost(number: int, seed: int) -> None:
     """Print the error and the time of planned responses, and of the cheapest candidate."""
 
-    def verdicts() -> Iterator[tuple[bool, bool, bool]]:
-        for k, scene, tolerance in scenes(seed, is_flat):
-            body = scene.body
-            far = replace(body, width=2 * body.width, height=2 * body.height)
-            fine = replace(scene, body=far) if body.sides == "absorbing" else scene
-            try:
-                h, progress = FINEST * default_size(body), limited(SLOWEST)
-                reference = compute(fine, "fem", h=h, progress=progress).values
-                chosen, planning = timed(plan, scene, SolveOptions(tolerance=tolerance))
-            except (ValueError, TooSlow):  # refused, or too large
-                continue
-            response, seconds = timed(solve, scene, chosen)
-            if chosen.prepared:  # the time of a reduction during planning counts for the response
-                seconds, planning = seconds + chosen.seconds, planning - chosen.seconds
-            wrong = error(response.values, reference)
-            name, least = cheapest(scene, tolerance, reference)
-            ratios = seconds / least, (seconds + planning) / least
-            row(k, f"{body.kind}, {body.sides}", f"{tolerance:.0%}", f"{wrong:.2%}", chosen.model,
-                f"{seconds:.1f} s", f"{planning:.1f} s", name, f"{least:.1f} s",
-                *(f"{each:.1f}" for each in ratios))  # fmt: skip
-            yield wrong <= tolerance, ratios[0] <= 5, ratios[1] <= 5
+    def verdicts(k: int, scene: Scene, tolerance: float) -> tuple[bool, bool, bool]:
+        body, h = scene.body, FINEST * default_size(scene.body)
+        far = replace(body, width=2 * body.width, height=2 * body.height)
+        fine = replace(scene, body=far) if body.sides == "absorbing" else scene
+        if fine.body.width * fine.body.height * max(body.depth, h) > MOST_CELLS * h**3:
+            raise ValueError("too large")
+        reference = compute(fine, "fem", h=h, progress=limited(SLOWEST)).values
+        chosen, planning = timed(plan, scene, SolveOptions(tolerance=tolerance))
+        response, seconds = timed(solve, scene, chosen)
+        if chosen.prepared:  # the time of a reduction during planning counts for the response
+            seconds, planning = seconds + chosen.seconds, planning - chosen.seconds
+        wrong = error(response.values, reference)
+        name, least = cheapest(scene, tolerance, reference)
+        ratios = seconds / least, (seconds + planning) / least
+        row(k, f"{body.kind}, {body.sides}", f"{tolerance:.0%}", f"{wrong:.2%}", chosen.model,
+            f"{seconds:.1f} s", f"{planning:.1f} s", name, f"{least:.1f} s",
+            *(f"{each:.1f}" for each in ratios))  # fmt: skip
+        return wrong <= tolerance, ratios[0] <= 5, ratios[1] <= 5
 
     row = table("scene", "kind, sides", "limit", "error", "chosen", "time", "planning",
                 "cheapest in tolerance", "time", "ratio", "with")  # fmt: skip
-    counts = np.sum([*islice(verdicts(), number)], axis=0)
+    counts = np.sum(each_scene(number, seed, is_flat, verdicts), axis=0)
     print(f"{counts[0]} of {number} within the tolerance; {counts[1]} at no more than five times "
           f"the cheapest, {counts[2]} with planning")  # fmt: skip
 
