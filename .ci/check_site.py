@@ -22,10 +22,11 @@ FETCHED = {
     ("link", "href"),
     ("source", "src"),
 }
-OPENED = ("index", "waves", "tutorial/1-first-scene", "how-to",
+OPENED = ("index", "waves", "tutorial/1-first-scene", "tutorial/2-kernel-and-waves", "how-to",
           "explanation/load", "reference/commands", "reference/scene-keys",
           "reference/api-skinwave", "reference/verification", "gallery/index",
           "gallery/11_fingertip_with_bone")  # fmt: skip
+WIDE_CODE = "[...document.querySelectorAll('pre')].some((x) => x.scrollWidth > x.clientWidth)"
 SERIOUS = ("serious", "critical")
 
 
@@ -89,6 +90,8 @@ def inaccessible(folder: Path) -> Iterator[str]:
                 page.set_viewport_size({"width": width, "height": 900})
                 if page.evaluate("document.documentElement.scrollWidth") > width:
                     yield f"{name}: is wider than {width} pixels"
+                if width == 1280 and page.evaluate(WIDE_CODE):
+                    yield f"{name}: a line of code is wider than its column"
             yield from (f"{name}: {text}" for text in said)
             # Without `preload`, which asks for style sheets that pages from files do not hand out.
             options = {"resultTypes": ["violations"], "preload": False}

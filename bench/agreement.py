@@ -361,9 +361,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--models", nargs="+", default=(), help="only these models")
-    parser.add_argument(
-        "--slowest", type=float, default=SLOWEST, help="limit of the CPU time of a response, s"
-    )
+    parser.add_argument("--slowest", type=float, default=SLOWEST, help="CPU time of a response, s")
     given = parser.parse_args()
     numbers = range(given.first, given.first + given.count)
     scenes = [random_scene(k, given.seed) for k in numbers]

@@ -145,15 +145,15 @@ def with_empty_cache(call: Callable[..., Any], *arguments: Any) -> Any:
 
 def compare(names: list[str]) -> None:
     """Print a table of predicted over measured cost."""
-    row = table("scene", "model", "planning", "predicted", "measured", "CPU", "ratio", "memory",
-                "ratio")  # fmt: skip
+    row = table("scene", "model", "planning, s", "predicted, s", "measured, s", "CPU, s", "ratio",
+                "GiB", "ratio")  # fmt: skip
     for name in names:
         planned = with_empty_cache(predicted, name)
         wall, own, memory = with_empty_cache(measured, name, planned)
         seconds = wall if named(planned["model"]).is_reduced else own
-        row(name, planned["model"], f"{planned['planning']:.1f} s", f"{planned['seconds']:.2f} s",
-            f"{wall:.2f} s", f"{own:.1f} s", f"{planned['seconds'] / seconds:.2f}",
-            f"{memory / 2**30:.2f} GiB", f"{planned['memory'] / memory:.2f}")  # fmt: skip
+        row(name, planned["model"], f"{planned['planning']:.1f}", f"{planned['seconds']:.2f}",
+            f"{wall:.2f}", f"{own:.1f}", f"{planned['seconds'] / seconds:.2f}",
+            f"{memory / 2**30:.2f}", f"{planned['memory'] / memory:.2f}")  # fmt: skip
 
 
 if __name__ == "__main__":

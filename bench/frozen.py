@@ -38,13 +38,13 @@ def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
 
 
 def write_scenes(folder: Path) -> None:
-    """Write the examples, and random slabs and sheets."""
-    from bench.plans import each_scene, is_flat
+    """Write the examples, and random slabs."""
+    from bench.plans import each_scene, is_slab
     from skinwave.scene.file import dumps
 
     folder.mkdir(parents=True)
     texts = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.toml")}
-    for k, scene in enumerate(each_scene(PLANNED, 0, is_flat, lambda _k, scene, _limit: scene)):
+    for k, scene in enumerate(each_scene(PLANNED, 0, is_slab, lambda _k, scene, _limit: scene)):
         texts[f"planned-{k:02}"] = dumps(scene)
     for name, text in texts.items():
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
@@ -138,9 +138,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench.frozen", description=__doc__)
     parser.add_argument("what", choices=("write", "compare"))
     parser.add_argument("folder", type=Path, metavar="DIR")
-    parser.add_argument(
-        "--only", default="", metavar="TEXT", help="only parts whose names start with this text"
-    )
+    parser.add_argument("--only", default="", metavar="TEXT", help="only parts that start with it")
     given = parser.parse_args()
     folder = given.folder.resolve()
     scenes = folder / "scenes"

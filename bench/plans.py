@@ -8,7 +8,6 @@ import contextlib
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from itertools import count, islice
 from typing import Any
 
@@ -26,7 +25,7 @@ from skinwave.models.reduced import answer, reduce_scene
 from skinwave.models.relative_change import relative_changes
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import about_its_rest
-from skinwave.planning.simulate import compute, solve
+from skinwave.planning.simulate import compute, solve_as_planned
 from skinwave.scene.file import from_table, loads
 from skinwave.scene.scene import Scene
 from skinwave.typing import Array, Floats
@@ -71,9 +70,9 @@ def each_scene(
     return [*islice(values(), number)]
 
 
-def is_flat(scene: Scene) -> bool:
-    """Return whether the body of a scene is a slab or a sheet, under a pressure."""
-    return scene.body.kind in ("slab", "sheet") and scene.load.kind == "pressure"
+def is_slab(scene: Scene) -> bool:
+    """Return whether the body of a scene is a slab under a pressure."""
+    return scene.body.kind == "slab" and scene.load.kind == "pressure"
 
 
 def error(found: Array, expected: Array) -> float:
@@ -139,32 +138,35 @@ def cost(number: int, seed: int) -> None:
         body, h = scene.body, FINEST * default_size(scene.body)
         far = replace(body, width=2 * body.width, height=2 * body.height)
         fine = replace(scene, body=far) if body.sides == "absorbing" else scene
-        if fine.body.width * fine.body.height * max(body.depth, h) > MOST_CELLS * h**3:
+        if fine.body.width * fine.body.height * body.depth > MOST_CELLS * h**3:
             raise ValueError("too large")
         reference = compute(fine, "fem", h=h, progress=limited(SLOWEST)).values
         chosen, planning = timed(plan, scene, SolveOptions(tolerance=tolerance))
-        response, seconds = timed(solve, scene, chosen)
+        response, seconds = timed(solve_as_planned, scene, chosen)
         if chosen.prepared:  # the time of a reduction during planning counts for the response
             seconds, planning = seconds + chosen.seconds, planning - chosen.seconds
         wrong = error(response.values, reference)
         name, least = cheapest(scene, tolerance, reference)
         ratios = seconds / least, (seconds + planning) / least
-        row(k, f"{body.kind}, {body.sides}", f"{tolerance:.0%}", f"{wrong:.2%}", chosen.model,
-            f"{seconds:.1f} s", f"{planning:.1f} s", name, f"{least:.1f} s",
-            *(f"{each:.1f}" for each in ratios))  # fmt: skip
+        row(
+            k,
+            body.sides,
+            f"{tolerance:.0%}",
+            f"{wrong:.2%}",
+            chosen.model,
+            f"{seconds:.1f}",
+            f"{planning:.1f}",
+            name,
+            f"{least:.1f}",
+            *(f"{each:.1f}" for each in ratios),
+        )
         return wrong <= tolerance, ratios[0] <= 5, ratios[1] <= 5
 
-    row = table("scene", "kind, sides", "limit", "error", "chosen", "time", "planning",
-                "cheapest in tolerance", "time", "ratio", "with")  # fmt: skip
-    counts = np.sum(each_scene(number, seed, is_flat, verdicts), axis=0)
+    row = table("scene", "sides", "limit", "error", "chosen", "s", "planning, s",
+                "cheapest in tolerance", "s", "ratio", "with")  # fmt: skip
+    counts = np.sum(each_scene(number, seed, is_slab, verdicts), axis=0)
     print(f"{counts[0]} of {number} within the tolerance; {counts[1]} at no more than five times "
           f"the cheapest, {counts[2]} with planning")  # fmt: skip
-
-
-def _added(drawn: Scene, count: int, steps: int) -> Floats:
-    """Return what stretching adds to a response (t, p), with modes and steps as in `Run`."""
-    run = Run(count=count, steps=steps)
-    return plate_modes.stretching_in_run(drawn, sample_times(drawn), run)
 
 
 def sheets() -> None:
@@ -175,7 +177,10 @@ def sheets() -> None:
         drawn = loads(text)
         times = sample_times(drawn)
         steps = len(times) - 1
-        added = partial(_added, drawn)
+
+        def added(count: int, steps: int, drawn: Scene = drawn, times: Floats = times) -> Floats:
+            return plate_modes.stretching_in_run(drawn, times, Run(count=count, steps=steps))
+
         lines = timed(plate_modes.steady_lines, drawn)[1]
         planning = timed(plan, drawn, SolveOptions())[1]
         one = timed(added, COUNTS[0], steps - 1)[1]  # the plate is known from the plan

@@ -26,8 +26,9 @@ def scraper(block: Any, values: dict[str, Any], settings: dict[str, Any]) -> str
         plt.close(small)
     for plotter in _ALL_PLOTTERS.values():
         image = Image.fromarray(plotter.last_image)
+        image = image.crop((0, 0, 6 * image.width // 7, image.height))  # without the colour bar
         size = tuple(SHARPNESS * each for each in SIZE)
-        ImageOps.fit(image, size, bleed=0.1).save(next(names))  # without the colour bar at the edge
+        ImageOps.pad(image, size, color="white").save(next(names))
     return matplotlib_scraper(block, values, settings) + Scraper()(block, values, settings)
 
 
@@ -44,6 +45,7 @@ def reduced(figure: Any) -> Any:
         each.set_visible(False)
         each.set_in_layout(False)
     ax.set_subplotspec(figure.add_gridspec(1, 1)[0, 0])
+    ax.set_anchor("C")
     ax.set_title(ax.get_ylabel(), loc="left")  # a long name does not fit beside the axes
     ax.set_ylabel("")
     for each in ax.findobj(Text):

@@ -113,6 +113,14 @@ def test_outputs_follow_the_code_of_the_tutorial():
         assert all(piece.startswith("\n<!-- output") for piece in pieces), page
 
 
+def test_each_part_of_the_stated_error_is_explained():
+    sources = [path.read_text("utf-8") for path in (ROOT / "skinwave").rglob("*.py")]
+    names = {name for text in sources for name in re.findall(r'ErrorPart\(\s*name="([^"]+)"', text)}
+    page = (ROOT / "docs/explanation/errors.md").read_text("utf-8")
+    assert len(names) > 12
+    assert [name for name in sorted(names) if f"| {name} |" not in page] == []
+
+
 def test_scripts_of_the_gallery_are_short_and_assert_a_number():
     scripts = sorted((ROOT / "examples/gallery").glob("*.py"))
     assert len(scripts) >= 12
