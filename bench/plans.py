@@ -183,7 +183,7 @@ def sheets() -> None:
 
         lines = timed(plate_modes.steady_lines, drawn)[1]
         planning = timed(plan, drawn, SolveOptions())[1]
-        one = timed(added, COUNTS[0], steps - 1)[1]  # the plate is known from the plan
+        one = timed(added, ACCURACY.counts[0], steps - 1)[1]  # the plate is known from the plan
         answered = timed(compute, drawn, STRETCHED.name)[1]
         mapped = timed(sheet_motion, drawn, tolerance)[1]
         found = plate_modes.stretched(drawn, len(times), float(times[1]), tolerance, None)
