@@ -30,17 +30,17 @@ def as_sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def with_error(value: float, error: float, digits: int = 3) -> str:
+def with_error(value: float, error: float) -> str:
     """Format a number with its standard error: the error to two digits, the number to the same
     decimal place.
 
-    If the error is not known (not finite, or 0), the number has `digits` significant digits.
+    If the error is not known (not finite, or 0), the number has three significant digits.
 
     >>> with_error(12.3456, 0.123)
     '12.35 ± 0.12'
     """
     if not (isfinite(value) and isfinite(error) and error > 0):
-        return significant(value, digits)
+        return significant(value)
     places = max(1 - floor(log10(error)), 0)
     return f"{value:,.{places}f} ± {error:,.{places}f}"
 

@@ -21,8 +21,6 @@ from simple_model.layers.stack import Stack
 from simple_model.layers.thin_layers import eigenpairs, outgoing, pencil
 from simple_model.typing import Bools, Complex, Floats
 
-KINDS = ("propagating", "backward", "leaky", "evanescent")
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mode:
@@ -36,7 +34,7 @@ class Mode:
         wave
     slowness : (f,) complex, s/m, dk/dw
     residues : (f,) complex, 1/Pa/m, of the surface compliance in k^2
-    kinds : (f,) str, one of `KINDS`, or "" without a root
+    kinds : (f,) str, "propagating", "backward", "leaky", "evanescent", or "" without a root
     shapes : (f, d, 2) complex, displacement along x over i, and downwards, at the depths of the
         curves, over the largest magnitude
     """

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import isfinite
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -145,7 +145,6 @@ class ModulusTable:
 
     frequencies: tuple[float, ...]
     moduli: tuple[complex, ...]
-    is_analytic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         f, mu = self._arrays

@@ -136,18 +136,8 @@ class MovingPressure:
             factor = factor * path.tangent_at_phase(phase)[..., HEADINGS.index(self.heading)]
         return factor
 
-    def gain(self, t: ArrayLike, over: float = 0.0, samples: int = 8) -> Floats:
-        """Pressure (...) in Pa at each focus at times (...) in s, without the level of the path.
-
-        Rhythms and signals are averaged by some `samples` over a time `over` in s about each time,
-        but not before the start.
-        """
-        if over and self.tacton.is_sampled:
-            parts = ((np.arange(samples) + 0.5) / samples - 0.5) * over
-            fine = np.asarray(t, np.float64)[..., None] + parts
-            has_started = fine >= 0
-            gain = self.gain(np.maximum(fine, 0.0)) * has_started
-            return np.asarray(gain.sum(axis=-1) / has_started.sum(axis=-1))
+    def gain(self, t: ArrayLike) -> Floats:
+        """Pressure (...) in Pa at each focus at times (...) in s, without the level of the path."""
         return self.gain_at(modulation(self.tacton, t), level(self.tacton, t))
 
     def gain_at(self, modulation: Floats, level: Floats | float = 1.0) -> Floats:

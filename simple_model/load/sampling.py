@@ -35,7 +35,7 @@ def _highest_order(pressure: MovingPressure) -> int:
 def highest_line(pressure: MovingPressure) -> float:
     """Highest line in Hz of a load at any place; 0, unknown, for a load of another type.
 
-    Rhythms are averaged over a sample and do not count; a signal counts with half its rate.
+    The edges of a rhythm do not count; a signal counts with half its rate.
     """
     if not isinstance(pressure, MovingPressure):
         return 0.0

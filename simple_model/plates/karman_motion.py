@@ -39,7 +39,7 @@ from simple_model.load.pressure import MovingPressure
 from simple_model.load.spectrum import lines_from_rest, synthesise
 from simple_model.plates.free_modes import Loss, free_modes
 from simple_model.plates.modes import PlateModes, modal_motion, modal_motion_apart
-from simple_model.plates.path_forces import MIDDLE, modal_path_forces
+from simple_model.plates.path_forces import modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
 from simple_model.typing import Complex, Floats, Ints
 
@@ -50,7 +50,7 @@ def linear_motion(
     material: Material,
     times: Floats,
     *,
-    middle: Sequence[float] = MIDDLE,
+    middle: Sequence[float] = (0.0, 0.0),
     chosen: Ints | None = None,
     driving: float = np.inf,
     highest: float = np.inf,

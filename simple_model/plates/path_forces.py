@@ -1,24 +1,20 @@
-"""Steady response of a plate to a moving pressure, by its modes."""
+"""Forces of a moving pressure on the modes of a plate."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from simple_model.layers.material import ModulusLaw
 from simple_model.load.focus import spot_detail, spot_reach
 from simple_model.load.path_cells import path_samples
 from simple_model.load.pressure import MovingPressure
-from simple_model.load.spectrum import load_lines, path_forces
-from simple_model.plates.modes import PlateModes, modal_motion
+from simple_model.load.spectrum import path_forces
+from simple_model.plates.modes import PlateModes
 from simple_model.plates.polynomials import gauss_points
 from simple_model.typing import Complex, Floats
 
-MIDDLE = (0.0, 0.0)
-
 
 def modal_path_forces(
-    modes: PlateModes, pressure: MovingPressure, middle: Sequence[float] = MIDDLE
+    modes: PlateModes, pressure: MovingPressure, middle: Sequence[float] = (0.0, 0.0)
 ) -> Complex:
     """Modal forces (n, m) in N kg^-1/2 of unit pressure on the path, by harmonic of the path;
     `middle` (2,) in m is the centre of the plate.
@@ -34,27 +30,6 @@ def modal_path_forces(
     shapes = modes.on_grid(x - middle[0], y - middle[1])
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     return path_forces(pressure, points, shapes * np.outer(of_x, of_y).reshape(-1, 1))
-
-
-def plate_lines(
-    modes: PlateModes,
-    pressure: MovingPressure,
-    probes: ArrayLike,
-    modulus: ModulusLaw,
-    *,
-    middle: Sequence[float] = MIDDLE,
-    path: Complex | None = None,
-) -> tuple[Floats, Complex]:
-    """Lines of the steady displacement at probes (p, 2) in m, positive in the direction of the
-    pressure: frequencies (f,) in Hz and complex amplitudes (f, p) in m.
-
-    `modulus` is that of `modal_motion`, `middle` that of `modal_path_forces`; `path` (n, m) are the
-    modal path forces, if known.
-    """
-    path = modal_path_forces(modes, pressure, middle) if path is None else path
-    frequencies, forces = load_lines(pressure).gather(path)
-    outputs = modes.at(np.asarray(probes, np.float64) - middle)
-    return frequencies, modal_motion(modes, frequencies, forces, modulus) @ outputs.T
 
 
 def _gauss(low: float, high: float, detail: float, spacing: float = 0.9) -> tuple[Floats, Floats]:

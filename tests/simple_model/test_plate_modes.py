@@ -7,12 +7,11 @@ from scipy.integrate import solve_ivp
 from scipy.sparse.linalg import eigsh
 
 from simple_model import Material, MovingPressure, PronyTerm, Tacton, Trajectory
-from simple_model.layers.prony import constant_loss
 from simple_model.load.spectrum import load_lines, reduced_lines
 from simple_model.plates.air import air_of
 from simple_model.plates.free_modes import free_modes
 from simple_model.plates.modes import Plate, modal_motion, plate_modes
-from simple_model.plates.path_forces import modal_path_forces, plate_lines
+from simple_model.plates.path_forces import modal_path_forces
 from simple_model.plates.polynomials import line_basis
 
 D, MASS, SIDE = 3.66e-4, 0.08, 0.1  # N m, kg/m2, m
@@ -186,11 +185,6 @@ def test_the_moving_load_is_that_of_a_fine_grid():
     np.testing.assert_array_equal(found_at, frequencies)
     strong = np.abs(expected) > 1e-2 * np.abs(expected).max()
     np.testing.assert_allclose(found[strong], expected[strong], rtol=2e-3)
-    probes = [[0.0, 0.0], [0.01, 0.0]]
-    modulus = constant_loss(0.03)
-    f, u = plate_lines(modes, pressure, probes, modulus, middle=middle)
-    shapes = modes.at(probes - middle)
-    np.testing.assert_allclose(u, (modal_motion(modes, f, found, modulus) @ shapes.T), rtol=1e-12)
 
 
 def test_invalid_plates_are_refused():

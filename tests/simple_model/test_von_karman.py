@@ -11,10 +11,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize
 
 from simple_model import from_young
-from simple_model.load.spectrum import synthesise
+from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.plates.karman_motion import linear_motion, stretched_motion
-from simple_model.plates.modes import Plate, plate_modes
-from simple_model.plates.path_forces import plate_lines
+from simple_model.plates.modes import Plate, modal_motion, plate_modes
+from simple_model.plates.path_forces import modal_path_forces
 from simple_model.plates.polynomials import gauss_points
 from simple_model.plates.von_karman import karman_plate
 from skinwave.bodies.supports import Mounting
@@ -273,10 +273,10 @@ def test_at_small_amplitude_it_is_the_linear_plate():
     found = stretched_motion(plate, linear[:, plate.chosen], 1e-4, DULL)
     linear[:, plate.chosen] = found
     modulus = lambda w: DULL.complex_modulus(w) / DULL.shear_modulus  # noqa: E731
-    f, amplitudes = plate_lines(plate.modes, load, probe, modulus)
+    f, forces = load_lines(load).gather(modal_path_forces(plate.modes, load))
     late = times > 0.45
-    steady = synthesise(f, amplitudes, times[late])[:, 0]
-    moved = (linear @ plate.modes.at(probe)[0])[late]
+    steady = synthesise(f, modal_motion(plate.modes, f, forces, modulus), times[late])
+    steady, moved = (x @ plate.modes.at(probe)[0] for x in (steady, linear[late]))
     assert np.abs(moved - steady).max() < 1e-4 * np.abs(steady).max()
 
 
