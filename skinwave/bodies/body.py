@@ -195,12 +195,10 @@ class Body:
     @property
     def strata(self) -> tuple[tuple[float, Material], ...]:
         """(Depth in m at the top, material) of each stratum; equal neighbours are merged."""
+        layers = [(layer.thickness, solid_of(layer.material)) for layer in self.layers]
         strata: list[tuple[float, Material]] = []
         top = 0.0
-        for thickness, material in [
-            *((layer.thickness, solid_of(layer.material)) for layer in self.layers),
-            (inf, self.solid),
-        ]:
+        for thickness, material in [*layers, (inf, self.solid)]:
             if not strata or strata[-1][1] != material:
                 strata.append((top, material))
             top += thickness

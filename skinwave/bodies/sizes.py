@@ -92,7 +92,7 @@ def map_size(body: Body, coarser: float = 2.0) -> float:
     return coarser * default_size(body)
 
 
-def thicknesses(strata: Strata) -> list[float]:
+def stratum_thicknesses(strata: Strata) -> list[float]:
     """Return the thickness in m of each stratum; that of the last is inf."""
     starts = [start for start, _ in strata]
     return np.diff([*starts, inf]).tolist()
@@ -118,7 +118,7 @@ def resolving_size(strata: Strata) -> float:
     """Return the coarsest size in m of elements that resolve layers without conforming to them: an
     element resolves layers of at least half its size.
     """
-    return 2 * min(thicknesses(strata))
+    return 2 * min(stratum_thicknesses(strata))
 
 
 def coarsest_size(body: Body) -> float:
@@ -142,7 +142,7 @@ def coat(body: Body, h: float) -> Coat | None:
         return None
     return Coat(
         materials=tuple(solid for _, solid in body.strata[:count]),
-        thicknesses=tuple(thicknesses(body.strata)[:count]),
+        thicknesses=tuple(stratum_thicknesses(body.strata)[:count]),
     )
 
 

@@ -28,7 +28,7 @@ from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies import sheet
 from skinwave.bodies.analytic import compliance, stack
 from skinwave.bodies.parts import FLAT
-from skinwave.bodies.sizes import thicknesses
+from skinwave.bodies.sizes import stratum_thicknesses
 from skinwave.models import Cost, Limit, Model, limits, register
 from skinwave.models.costs import UNITS, Cheaper, computed_times, lines_below, synthesis
 from skinwave.models.laws import has_table
@@ -172,7 +172,7 @@ def _integrals(scene: Scene, omega: float) -> tuple[int, int, float, float]:
     integration.
     """
     body, depths = scene.body, sorted(set(scene.depths))
-    layers = sum(isfinite(each) for each in thicknesses(body.strata)) + isfinite(body.depth)
+    layers = sum(isfinite(each) for each in stratum_thicknesses(body.strata)) + isfinite(body.depth)
     fields = [each for depth in depths for each in fields_read(scene, depth)]
     terms = sum(int(np.count_nonzero(each.uses)) for each in fields)
     moduli = [solid.complex_modulus(omega) for _, solid in body.strata]

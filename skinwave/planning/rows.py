@@ -5,7 +5,7 @@ import numpy as np
 from simple_model import Effort
 from simple_model.numbers import EN_DASH, change_text, percent, significant
 from skinwave.bodies.sheet import air_mass
-from skinwave.bodies.sizes import COAT_FREQUENCY, coat, layer_name, thicknesses
+from skinwave.bodies.sizes import COAT_FREQUENCY, coat, layer_name, stratum_thicknesses
 from skinwave.models import Cost
 from skinwave.models.reduced import reduction_tolerance
 from skinwave.models.symmetry import axes_of_probes, mirrored_axes
@@ -83,7 +83,7 @@ def coat_rows(body: Body, h: float, stiff: float = 30.0) -> list[PlanRow]:
     """
     shell = coat(body, h)
     coated = len(shell.materials) if shell else 0
-    layers = list(zip(body.strata, thicknesses(body.strata), strict=True))[:-1]
+    layers = list(zip(body.strata, stratum_thicknesses(body.strata), strict=True))[:-1]
     names = [f"{layer_name(body, solid)} of {1e3 * t:g} mm" for (_, solid), t in layers]
     rows = []
     if shell:
