@@ -132,13 +132,13 @@ class Driven:
     outputs: Floats
 
 
-def _solver(model: str, motion: Callable[[Scene, Driven, Floats], Floats]) -> Solve:
-    """Return the function of a model that solves its `motion` (t, p) of the driven modes."""
+def _solver(model: str, values_of: Callable[[Scene, Driven, Floats], Floats]) -> Solve:
+    """Return the function of a model that computes the values (t, p) of driven modes."""
 
     @one_thread()
     def solve(scene: Scene, times: Floats, options: SolveOptions) -> Response:
         started, driven = time.perf_counter(), _drive(scene, times, options.progress)
-        values = motion(scene, driven, times)
+        values = values_of(scene, driven, times)
         effort = Effort(
             seconds={"evaluate": time.perf_counter() - started}, dofs=len(driven.modes.squared),
             steps=len(driven.frequencies), peak_memory=peak_memory(),

@@ -235,10 +235,9 @@ def _why_elements(scene: Scene) -> str:
 
 def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
     """Return the highest relevant line in Hz, and its row."""
-    spectrum, motion = estimates.response_spectrum(scene, tolerance), scene.load.support_motion
-    highest = max(
-        estimates.cutoff_frequency(*spectrum, tolerance), motion.frequency if motion else 0.0
-    )
+    spectrum, support = estimates.response_spectrum(scene, tolerance), scene.load.support_motion
+    highest = estimates.cutoff_frequency(*spectrum, tolerance)
+    highest = max(highest, support.frequency) if support else highest
     return highest, PlanRow(
         what="highest line",
         value=f"{highest:.0f} Hz",

@@ -151,21 +151,23 @@ def refine(
         if h or not tolerance < error < np.inf or sizes[-1] > size / SIZES.last_step:
             return Refined(h=size, error=error, compared=before, prepared=prepared)
         solved[size] = prepared, values
-        size = controller(meshed).nearest(finer_sizes(sizes, size), size, error, tolerance)
+        coarser_ones = np.count_nonzero(sizes > size / SIZES.step * (1 + 1e-9))
+        finer = sizes[min(coarser_ones, len(sizes) - 1) :]
+        size = controller(meshed).nearest(finer, size, error, tolerance)
         prepared, values = solve(size)
 
 
 def controller(scene: Scene) -> SizeController:
     """Return the controller of the element size in a scene."""
-    # Meshes of files vary between runs, and one more takes longer than slightly smaller elements.
-    from_file = SizeController(at_default=0.026)
     if scene.body.file:
-        return from_file
+        # Meshes of files vary between runs, and one more takes longer than slightly finer elements.
+        return SizeController(at_default=0.026)
     is_smooth = scene.body.of_kind.is_smooth and len(scene.body.strata) == 1
+    if is_smooth and scene.reading.record.field != STRAIN:
+        return SizeController(margin=1.1, at_default=0.012)
     # Clamped edges and jumps of material slow the convergence, and so does strain. A palm has no
     # such edges, because its supports begin smoothly.
-    singular, smooth = SizeController(), SizeController(margin=1.1, at_default=0.012)
-    return smooth if is_smooth and scene.reading.record.field != STRAIN else singular
+    return SizeController()
 
 
 def first_size(scene: Scene, sizes: Floats, tolerance: float) -> float:
@@ -213,12 +215,6 @@ def element_sizes(body: Body, steps: int = 12) -> Floats:
         layered += [size] if size < layered[-1] else []
     sizes = np.array(layered)
     return sizes[max(0, np.count_nonzero(sizes >= coarsest) - 1) :]
-
-
-def finer_sizes(sizes: Floats, size: float) -> Floats:
-    """Return the sizes that are finer than a size by a step or more, or the last size."""
-    coarser = np.count_nonzero(sizes > size / SIZES.step * (1 + 1e-9))
-    return sizes[min(coarser, len(sizes) - 1) :]
 
 
 def comparison_size(body: Body, h: float) -> float:

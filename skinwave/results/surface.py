@@ -136,13 +136,11 @@ def body_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions = DEFAULT
     if options.h is None and takes(FROM_REST, scene):
         return _plate_map(scene, x, y, options)
     if has_wavenumber_integral(scene):
-
-        def lines_of(scene: Scene) -> Lines:
-            return _interpolate(scene.pressure, surface_lines(scene), x, y)
-
-        return _field(scene, x, y, lines_of, "laterally infinite layer")
-    motion = next(map_motions([scene], options))[1]
-    return element_map(scene, motion, x, y)
+        return _field(
+            scene, x, y, lambda each: _interpolate(each.pressure, surface_lines(each), x, y),
+            "laterally infinite layer",
+        )  # fmt: skip
+    return element_map(scene, next(map_motions([scene], options))[1], x, y)
 
 
 def map_motions(
@@ -207,20 +205,19 @@ def quantity_map(
     """
     if not scene.body.of_kind.discretise:
         raise ValueError("a map needs a body, and the scene has none. Give one under [body]")
-    most_places = 40_000
-    if not (0 < step <= reach and (2 * reach / step + 1) ** 2 <= most_places):
+    if not (0 < step <= reach and (2 * reach / step + 1) ** 2 <= 40_000):
         raise ValueError(
             f"a map with reach {1e3 * reach:g} mm and step {1e3 * step:g} mm has no place, or more "
-            f"than {most_places:,}. Choose another step"
+            "than 40,000. Choose another step"
         )
     x, y = grid(scene, reach, step)
     if has_wavenumber_integral(scene):
-        body, places = field_read(scene, scene.depths[0]), _places(x, y)
-
-        def lines_of(scene: Scene) -> Lines:
-            return field_lines(body, scene.pressure, places, threshold=MAP.weakest_line)
-
-        return _field(scene, x, y, lines_of, "wavenumber integral of the laterally infinite body")
+        field = partial(field_lines, field_read(scene, scene.depths[0]))
+        return _field(
+            scene, x, y,
+            lambda each: field(each.pressure, _places(x, y), threshold=MAP.weakest_line),
+            "wavenumber integral of the laterally infinite body",
+        )  # fmt: skip
     if options.h is None and scene.reading.is_plain and takes(FROM_REST, scene):
         error = Statement(parts=own_parts(FROM_REST, scene)).error
         return replace(_plate_map(scene, x, y, options), error=error)
