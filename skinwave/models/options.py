@@ -17,8 +17,6 @@ from skinwave.scene.scene import MOST_VALUES, SAMPLE_RATE, Scene
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
-SIZES = {"h": ("element size", 1e3, "mm"), "dt": ("time step", 1.0, "s")}
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolveOptions:
@@ -67,7 +65,8 @@ class SolveOptions:
             raise ValueError(f"tolerance = {self.tolerance} is outside 0 < tolerance < 1")
         if self.solver != "auto":
             choose("solver", self.solver, ("auto", *fem.available()))
-        for name, (what, per_unit, unit) in SIZES.items():
+        sizes = {"h": ("element size", 1e3, "mm"), "dt": ("time step", 1.0, "s")}
+        for name, (what, per_unit, unit) in sizes.items():
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise ValueError(

@@ -69,13 +69,13 @@ def lines_unresolved(scene: Scene, response: Response) -> tuple[str, ...]:
         return ()
     lines = line_names(scene.pressure, WEAK_LINE_RATIO)
     least = resolution(response)
-    moving = np.where(lines.frequencies > 0, lines.strengths, 0.0)
-    if not moving.any() or (f := lines.frequencies[moving.argmax()]) >= least:
+    oscillating = np.where(lines.frequencies > 0, lines.strengths, 0.0)
+    if not oscillating.any() or (f := lines.frequencies[oscillating.argmax()]) >= least:
         return ()
-    length = np.ptp(response.times)
+    length, name = np.ptp(response.times), lines.names[oscillating.argmax()]
     return (
         f"the response of {1e3 * length:.3g} ms is too short for the strongest line of the load, "
-        f"{lines.names[moving.argmax()]} at {f:.4g} Hz, so that tables of lines leave it out; use "
+        f"{name} at {f:.4g} Hz, so that tables of lines leave it out; use "
         f"duration_s = {1.1 * length * least / f:.2g} or more",
     )
 

@@ -268,7 +268,7 @@ def about_its_rest(scene: Scene, waveforms: Array) -> Array:
 
 def quantity_of_interest(prepared: ReducedBody, scene: Scene, response: Response) -> Array:
     """Return the quantity of interest of a reduced body: its waveforms (t, p) or, for an
-    unconstrained body, the lines (f, p c) without the mean, because its drift would hide the rest.
+    unconstrained body, the lines (f, p c) without the mean, because its drift would hide them.
     """
     if scene.body.is_held:
         return about_its_rest(scene, response.values)
