@@ -42,8 +42,8 @@ def _registry(what: str, room: str, **modules: str) -> Registry[Format]:
 
 
 MEASUREMENTS = _registry(
-    "format of a measurement", "measure", labview=".tdms", arrays=".npz .mat",
-    universal=".uff .unv .uf .58", reading=".csv .tsv .txt .asc .dat .lvm .wav .f32",
+    "format of a measurement", "measure", reading=".csv .tsv .txt .asc .dat .lvm .wav .f32",
+    labview=".tdms", arrays=".npz .mat", universal=".uff .unv .uf .58",
 )  # fmt: skip
 PATTERN_READERS = _registry(
     "pattern format to read", "patterns", conversion=".toml", adaptics=".adaptics",
