@@ -425,7 +425,10 @@ def four_numbers(first: FirstScreen) -> Table:
     rows: list[tuple[str, str | None, Iterable[str | None]]]
     if any(run.is_skin for run in first.bodies):
         levels = (_sensation_text(e.highest_sensation) or _why_none(e) for e in effects)
-        reaches = (_threshold_text(e) or _why_none(e) for e in effects)
+        no_map = "none (no map)"
+        reaches = (
+            _threshold_text(e) or (no_map if e.highest_sensation else _why_none(e)) for e in effects
+        )
         rows = [
             ("highest sensation level at the probes", overview.OF_PRESSURE, levels),
             ("reach above threshold, from the path", overview.OF_PRESSURE, reaches),
@@ -538,7 +541,7 @@ def _component(component: Component | None, quantity: Quantity = DISPLACEMENT) -
 def _sensation_text(component: Component | None) -> str | None:
     if component is None or component.level is None:
         return None
-    return f"{component.level:+.0f} dB ({component.name}, {component.frequency:.0f} Hz)"
+    return f"{round(component.level):+d} dB ({component.name}, {component.frequency:.0f} Hz)"
 
 
 def _share(effect: Propagation) -> str | None:

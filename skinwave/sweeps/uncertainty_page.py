@@ -99,9 +99,9 @@ def sentences(found: Ensemble) -> list[str]:
         levels = found.level.max(axis=1)
         low, _, median, _, high = percentiles(levels)
         text.append(
-            f"Highest sensation level at a probe: median {median:+.0f} dB, in nine of ten samples "
-            f"{low:+.0f} to {high:+.0f} dB; above threshold in {percent((levels >= 0).mean())} of "
-            "the samples."
+            f"Highest sensation level at a probe: median {round(median):+d} dB, in nine of ten "
+            f"samples {round(low):+d} to {round(high):+d} dB; above threshold in "
+            f"{percent((levels >= 0).mean())} of the samples."
         )
     return text
 
