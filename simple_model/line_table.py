@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from simple_model.load.line_names import SAME_LINE, WEAKEST, LineNames, during_pulses, line_names
 from simple_model.load.pressure import MovingPressure
@@ -189,7 +190,7 @@ def _fit(named: LineNames, response: Response) -> _Fit:
     strengths = _strengths_above_zero(named)
     fitted = np.zeros(len(f), bool)
     for k in np.argsort(-strengths, kind="stable"):
-        fitted[k] = f[k] >= least and not _near(f[k : k + 1], f[fitted], least)[0]
+        fitted[k] = f[k] >= least and not _near(f[k], f[fitted], least)
     amplitudes = np.zeros((len(f), response.values.shape[1]))
     complex_amplitudes, rest = fit_lines(response, f[fitted])
     amplitudes[fitted] = np.abs(complex_amplitudes)
@@ -222,12 +223,10 @@ def _peaks(
     for k in chosen[:MOST_PEAKS]:
         bins = k + _offset(amplitude[k - 1 : k + 2, int(np.argmax(level[k]))])
         turns = bins / len(fit.rest)
-        f = np.array([turns / dt])
-        if _near(f, fitted, least)[0]:  # the start of a line
+        if _near(turns / dt, fitted, least):  # the start of a line
             continue
-        of_load = _near(f, driven, least)[0]
         free = response.record.of_body and _decays(fit.rest[begun:], turns)
-        kind = OF_LOAD if of_load else FREE if free else UNNAMED
+        kind = OF_LOAD if _near(turns / dt, driven, least) else FREE if free else UNNAMED
         peaks.append(Unnamed(frequency=turns / dt, amplitudes=amplitude[k], kind=kind))
     return peaks
 
@@ -285,8 +284,7 @@ def _table(named: LineNames, fit: _Fit, peaks: list[Unnamed], response: Response
     bin_width = 1 / (step(response.times) * len(response.times))
     mixed = fit.fitted & ~fit.resolved & (named.strengths > 0) & (relative > LEAST_PEAK)
     mixed &= f >= LOBE * bin_width
-    alone = [x for x in peaks
-             if not _near(np.array([x.frequency]), f[lost], LOBE * bin_width)[0]]  # fmt: skip
+    alone = [x for x in peaks if not _near(x.frequency, f[lost], LOBE * bin_width)]
     unnamed = [*_unresolved(response, f[mixed]), *alone]
     unnamed.sort(key=lambda peak: -float((peak.amplitudes / loudest).max()))
     return LineTable(
@@ -310,6 +308,6 @@ def _unresolved(response: Response, frequencies: Floats) -> list[Unnamed]:
     ]  # fmt: skip
 
 
-def _near(f: Floats, others: Floats, least: float) -> Bools:
-    """Whether each of the frequencies (f,) is within a resolution of any of the others (k,)."""
-    return np.asarray((np.abs(f[:, None] - others) < least).any(axis=1))
+def _near(f: ArrayLike, others: Floats, least: float) -> Bools:
+    """Whether each of the frequencies (...) is within a resolution of any of the others (k,)."""
+    return np.asarray((np.abs(np.subtract.outer(f, others)) < least).any(axis=-1))

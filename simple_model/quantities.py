@@ -112,10 +112,6 @@ def _choose(rows: Rows, component: int) -> Rows:
     return lambda material: rows(material)[[component]]
 
 
-def _identity(size: int) -> Rows:
-    return lambda material: np.eye(size)
-
-
 DISPLACEMENT, VELOCITY, ACCELERATION, PRESSURE = map(register, (
     Quantity(
         name="displacement", symbol="u_n", words="displacement into the body", unit="m",
@@ -137,12 +133,14 @@ DISPLACEMENT, VELOCITY, ACCELERATION, PRESSURE = map(register, (
 for _k, _axis in enumerate("xyz"):
     register(Quantity(
         name=f"displacement_{_axis}", symbol=f"u_{_axis}", words=f"displacement along {_axis}",
-        unit="m", shown="µm", per_unit=1e6, field=VECTOR, rows=_choose(_identity(3), _k),
+        unit="m", shown="µm", per_unit=1e6, field=VECTOR,
+        rows=_choose(lambda material: np.eye(3), _k),
     ))  # fmt: skip
 for _k, _pair in enumerate(COMPONENTS):
     register(Quantity(
         name=f"strain_{_pair}", symbol=rf"\varepsilon_{{{_pair}}}", words=f"strain {_pair}",
-        unit="1", shown="µm/m", per_unit=1e6, field=STRAIN, rows=_choose(_identity(6), _k),
+        unit="1", shown="µm/m", per_unit=1e6, field=STRAIN,
+        rows=_choose(lambda material: np.eye(6), _k),
     ))  # fmt: skip
     register(Quantity(
         name=f"stress_{_pair}", symbol=rf"\sigma_{{{_pair}}}", words=f"stress {_pair}",
@@ -150,7 +148,8 @@ for _k, _pair in enumerate(COMPONENTS):
     ))  # fmt: skip
 register(Quantity(
     name="largest_shear_strain", symbol=r"\gamma_{max}", words="largest shear strain", unit="1",
-    shown="µm/m", per_unit=1e6, field=STRAIN, rows=_identity(6), invariant=largest_shear,
+    shown="µm/m", per_unit=1e6, field=STRAIN, rows=lambda material: np.eye(6),
+    invariant=largest_shear,
 ))  # fmt: skip
 register(Quantity(
     name="von_mises_stress", symbol=r"\sigma_{vM}", words="von Mises stress", unit="Pa",

@@ -16,7 +16,7 @@ from scipy.special import hankel2e
 from simple_model.layers.compliance import AIR_DENSITY
 from simple_model.layers.half_space_below import modes_above_half_space, rayleigh_mode
 from simple_model.layers.material import Material
-from simple_model.layers.mode_tracking import Roots, frequencies_between, merge_roots, track_modes
+from simple_model.layers.mode_tracking import Roots, frequencies_between, track_modes
 from simple_model.layers.stack import Stack
 from simple_model.layers.thin_layers import eigenpairs, outgoing, pencil
 from simple_model.typing import Bools, Complex, Floats
@@ -152,8 +152,9 @@ def dispersion_curves(stack: Stack, frequencies: ArrayLike, *, most: int = 6) ->
             break
         # The ends of the band determine elements and depths.
         other, _ = _roots(stack, np.concatenate([omega[:1], further, omega[-1:]]), most_roots)
-        inner = other.apply(lambda values: values[1:-1])
-        roots, fine = merge_roots(roots, fine, inner, further)
+        both = roots.apply(lambda own, new: np.concatenate([own, new[1:-1]]), other)
+        order = np.argsort(fine := np.concatenate([fine, further]))
+        roots, fine = both.apply(lambda values, order=order: values[order]), fine[order]
     roots = track_modes(roots, fine, most, np.searchsorted(fine, omega))
     return curves(f, depths, roots, (), _leaking(stack, omega) if stack.is_half_space else None)
 

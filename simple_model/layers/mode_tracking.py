@@ -1,7 +1,7 @@
 """Modes followed along frequency: matching of roots at neighbouring frequencies."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,9 +32,10 @@ class Roots:
     energy_speed: Floats
     shapes: Complex
 
-    def apply(self, change: Callable[[Any], Any]) -> "Roots":
-        """Change every field."""
-        return Roots(**{field.name: change(getattr(self, field.name)) for field in fields(self)})
+    def apply(self, change: Callable[..., Any], *others: "Roots") -> "Roots":
+        """Change every field, given with those of other roots."""
+        each = {name: [vars(roots)[name] for roots in (self, *others)] for name in vars(self)}
+        return Roots(**{name: change(*values) for name, values in each.items()})
 
 
 def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots:
@@ -103,17 +104,6 @@ def frequencies_between(roots: Roots, omega: Floats, waves: Bools, most: int) ->
                 further.append(np.sqrt(omega[f] * omega[f + 1]))
                 break
     return np.array(further)
-
-
-def merge_roots(roots: Roots, omega: Floats, other: Roots, further: Floats) -> tuple[Roots, Floats]:
-    """Merge roots at frequencies (f,) and (g,) in rad/s; return them and their frequencies."""
-    both = np.concatenate([omega, further])
-    order = np.argsort(both)
-    values = {
-        name: np.concatenate([value, getattr(other, name)])[order]
-        for name, value in vars(roots).items()
-    }
-    return Roots(**values), both[order]
 
 
 def _at(values: Complex | Floats, index: np.ndarray) -> np.ndarray:

@@ -277,13 +277,11 @@ def _count(pressure: MovingPressure, fewest: int = 132) -> int:
     enough, whole = KNOTS_PER_WIDTH * path.length / detail, 12
     lines = SAMPLE_RATE / path.drawing_frequency
     if path.shape == "recorded":
-        moves = (steps := np.diff(path.times)) > 0
-        even = np.ptp(steps[moves]) < 1e-9 * path.times[-1]
-        whole = lcm(int(moves.sum()), n) if even else 12 * n
+        speeds, seconds = _moves(path)
+        even = np.ptp(seconds) < 1e-9 * path.times[-1]
+        whole = lcm(len(seconds), n) if even else 12 * n
         if not is_abrupt(pressure):
-            lengths = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
-            fastest = float((lengths[moves] / steps[moves]).max())
-            enough = min(KNOTS_PER_WIDTH * fastest * path.times[-1] / detail, lines)
+            enough = min(KNOTS_PER_WIDTH * float(speeds.max()) * path.times[-1] / detail, lines)
     if is_abrupt(pressure):
         return int(fft.next_fast_len(int(np.ceil(max(enough, lines, fewest)))))
     return whole * int(np.ceil(max(enough, fewest) / whole))
@@ -303,11 +301,16 @@ def _top_speed(path: Trajectory, brief: float = 0.01) -> float:
     """
     if path.shape != "recorded":
         return path.drawing_frequency * path.length * (np.pi / 2 if path.is_eased else 1.0)
+    speeds, seconds = _moves(path)
+    order = np.argsort(speeds)
+    passed = np.cumsum(seconds[order])
+    at = np.searchsorted(passed, (1 - brief) * passed[-1])
+    return float(speeds[order[min(at, len(order) - 1)]])
+
+
+def _moves(path: Trajectory) -> tuple[Floats, Floats]:
+    """Speeds (k,) in m/s and times (k,) in s of the moves of a recording, without its jumps."""
     steps = np.diff(path.times)
     moves = steps > 0
     lengths = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
-    speeds, lasting = lengths[moves] / steps[moves], steps[moves]
-    order = np.argsort(speeds)
-    passed = np.cumsum(lasting[order])
-    at = np.searchsorted(passed, (1 - brief) * passed[-1])
-    return float(speeds[order[min(at, len(order) - 1)]])
+    return lengths[moves] / steps[moves], steps[moves]

@@ -150,9 +150,8 @@ def _at_breaks(
             function = np.zeros((last, max(degrees) + 1))
             for piece, side in ((k - 1, 1), (k, 0)):
                 if 0 <= piece < last:
-                    function[piece, : degrees[piece] + 1] = of_piece[piece][
-                        count * side + derivative
-                    ]
+                    own = of_piece[piece][count * side + derivative]
+                    function[piece, : len(own)] = own
             yield function / np.linalg.norm(function)
 
 
