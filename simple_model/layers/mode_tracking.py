@@ -50,8 +50,8 @@ def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots
     for f in range(count):
         known = np.flatnonzero(np.isfinite(roots.squared[f]))
         latest = np.where(index >= 0, np.arange(count)[:, None], -1).max(axis=0, initial=-1)
-        # Near the frequency at which a mode begins to leak, up to three have no root.
-        alive = np.flatnonzero(f - latest <= 1 + 3)
+        # Near the frequency at which a mode begins to leak, up to three frequencies have no root.
+        alive = np.flatnonzero(f - latest <= 4)
         last = index[latest[alive], alive]
         costs, matches = _matches(roots, omega, (latest[alive], last), (f, known))
         pairs = [

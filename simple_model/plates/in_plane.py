@@ -60,8 +60,8 @@ def exact_grid(
 def in_plane_relief(
     plate: Plate, A: Floats, grid: Grid, odd: Sequence[int], in_plane: str, shift: float = 1e-10
 ) -> Callable[[Floats], Floats]:
-    """Return the function from strains (3, p, x, y), xx, yy and 2 xy, to what is left of them after
-    in-plane displacement.
+    """Return the function that subtracts from strains (3, p, x, y), xx, yy and 2 xy, those of the
+    in-plane displacement that relieves them.
 
     `A` (3, 3) in N/m is the stiffness of the plate to these strains, `in_plane` a key of
     `IN_PLANE`. If functions are split, `odd` states the symmetry of the strain xx along x and y. A
