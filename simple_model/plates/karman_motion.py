@@ -129,7 +129,7 @@ def stretched_motion(plate: KarmanPlate, linear: Floats, dt: float, material: Ma
     after = np.diag(inertia) - K
     shift = linear[2:] - linear[:-2]
     loads = shift @ system
-    before = -linear[0]  # not zero, because lines of the load are left out
+    before = -linear[0]  # not zero: air damps free motion as at each mode's own frequency
     apart = before - dt**2 / 2 * (K @ before) / M
     z = np.empty_like(linear)
     z[0], z[1] = 0.0, linear[1] + apart
