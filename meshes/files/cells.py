@@ -143,7 +143,7 @@ def _tetrahedra(
 
 
 def _first_of_duplicates(tets: Ints, region: Ints) -> Ints:
-    """Ascending numbers of different tetrahedra. The smallest region keeps its duplicates."""
+    """Ascending numbers of distinct tetrahedra. Duplicates keep the smallest of their regions."""
     _, place, count = np.unique(region, return_inverse=True, return_counts=True)
     order = np.argsort(count[place], kind="stable")
     _, first = np.unique(np.sort(tets[order, :4], axis=1), axis=0, return_index=True)
