@@ -40,21 +40,24 @@ RATE, STEPS = 10_000, 1000  # steps per second, for an error of 1 %; steps that 
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """A body of straight 10-node tetrahedra; `mu` in Pa, `nu`, `rho` in kg/m3, or (m, 1) each."""
+    """A body of straight 10-node tetrahedra: `nodes` (n, 3) in m, corners first; `cells` (m, 10)
+    in VTK's order; `mu` in Pa, `nu`, `rho` in kg/m3, for scikit-fem also (m, 1).
+    """
 
-    mesh: meshes.TetMesh
+    nodes: np.ndarray
+    cells: np.ndarray
     mu: Any = SKIN.shear_modulus
     nu: Any = SKIN.poisson
     rho: Any = SKIN.density
 
     @property
     def tets(self) -> np.ndarray:
-        return np.array(self.mesh.tets[:, :4])
+        return self.cells[:, :4]
 
     @property
     def points(self) -> np.ndarray:
         """The corners, which most codes take."""
-        return np.array(self.mesh.points[: self.tets.max() + 1])
+        return self.nodes[: self.tets.max() + 1]
 
     @property
     def lam(self) -> Any:
@@ -86,7 +89,7 @@ class Assembled:
 
 
 def skinwave(p: Problem) -> Assembled:
-    mesh = p.mesh
+    mesh = meshes.TetMesh(points=p.nodes, tets=p.cells)
     material = fem.Material(density=p.rho, shear_modulus=p.mu, poisson=p.nu)
     free = np.zeros(mesh.points.shape, bool)
     ops, seconds = timed(fem.assemble, mesh, material, fixed=free)
@@ -117,9 +120,7 @@ def scikit_fem(p: Problem) -> Assembled:
     for i in range(3):
         component[basis.nodal_dofs[i]] = component[basis.edge_dofs[i]] = i
     # Its example 19 steps in time with SciPy's splu.
-    return _scipy(
-        seconds, K, M, 3 * _match_nodes(basis.doflocs.T, p.mesh.points) + component, _superlu
-    )
+    return _scipy(seconds, K, M, 3 * _match_nodes(basis.doflocs.T, p.nodes) + component, _superlu)
 
 
 def ngsolve(p: Problem) -> Assembled:
@@ -176,25 +177,23 @@ def _from_hierarchical(p: Problem, mesh: Any) -> sparse.csr_array:
 
     ends = np.array([[vertex.nr for vertex in edge.vertices] for edge in mesh.edges])
     middles = (p.points[ends[:, 0]] + p.points[ends[:, 1]]) / 2
-    node, corners, edges = _match_nodes(middles, p.mesh.points), len(p.points), len(ends)
+    node, corners, edges = _match_nodes(middles, p.nodes), len(p.points), len(ends)
     bubble = ng.GridFunction(ng.H1(mesh, order=2))
     bubble.vec[corners] = 1
     height = bubble(mesh(*middles[0]))
     rows = np.concatenate([np.arange(corners), node, node, node])
     columns = np.concatenate([np.arange(corners), *ends.T, corners + np.arange(edges)])
     values = np.concatenate([np.ones(corners), np.full(2 * edges, 0.5), np.full(edges, height)])
-    scalar = sparse.csr_array(
-        (values, (rows, columns)), shape=(len(p.mesh.points), corners + edges)
-    )
+    scalar = sparse.csr_array((values, (rows, columns)), shape=(len(p.nodes), corners + edges))
     # NGSolve orders dofs component by component, skinwave node by node.
     by_component = sparse.csr_array(sparse.kron(np.eye(3), scalar))
-    return by_component[np.arange(3 * len(p.mesh.points)).reshape(3, -1).T.ravel()]
+    return by_component[np.arange(3 * len(p.nodes)).reshape(3, -1).T.ravel()]
 
 
 def felupe(p: Problem) -> Assembled:
     import felupe as fe
 
-    mesh = fe.Mesh(np.array(p.mesh.points), np.array(p.mesh.tets), "tetra10")
+    mesh = fe.Mesh(p.nodes, p.cells, "tetra10")
     started = time.perf_counter()
     region = fe.RegionQuadraticTetra(mesh)
     field = fe.FieldContainer([fe.Field(region, dim=3)])
@@ -248,8 +247,8 @@ CODES = {
 
 def assembly() -> None:
     """Print the time of each code to assemble K and M of a block."""
-    small, large = (Problem(mesh=block(n)) for n in ACROSS)
-    print(f"K and M of {len(large.tets):,} ten-node tetrahedra")
+    small, large = (problem(block(n)) for n in ACROSS)
+    print(f"K and M of {len(large.cells):,} ten-node tetrahedra")
     row = table("code", "version", "time", "ratio", "energy", "mass")
     first = None
     for name, seconds, energy, mass in each_code(time_assembly, small, large):
@@ -277,9 +276,7 @@ def waves() -> None:
                 "ratio", "to ours")  # fmt: skip
     row("skinwave, reduced", "", "", "", f"{one:.1f}", "1", f"{fifteen:.1f}", "1", "")
     ours = None
-    for name, assembled, factorised, step, motion in each_code(
-        time_steps, Problem(mesh=mesh), load
-    ):
+    for name, assembled, factorised, step, motion in each_code(time_steps, problem(mesh), load):
         once, second = assembled + factorised, step * RATE
         ours = motion if ours is None else ours
         apart = np.linalg.norm(motion - ours) / np.linalg.norm(ours)
@@ -297,7 +294,7 @@ def fingertip() -> None:
             np.array([getattr(m, key) for m in solids])[:, None]
             for key in ("shear_modulus", "poisson", "density", "viscosity")
         )
-        tip = Problem(mesh=mesh, mu=mu, nu=nu, rho=rho)
+        tip = problem(mesh, mu=mu, nu=nu, rho=rho)
         body, C = CODES["scikit-fem"](tip), CODES["scikit-fem"](replace(tip, mu=viscosity)).K
         free = np.flatnonzero(free_dofs(body, mesh.facets["sides"]))
         force, w = body.to_nodes.T @ statics.fingertip_push(mesh), 2 * np.pi * statics.FREQUENCY
@@ -318,7 +315,7 @@ def time_assembly(name: str, small: Problem, large: Problem) -> tuple[float, flo
     with threads(name):
         CODES[name](small)
         body = CODES[name](large)
-        return body.seconds, *body.check(large.mesh.points)
+        return body.seconds, *body.check(large.nodes)
 
 
 def time_steps(
@@ -362,6 +359,10 @@ def threads(name: str) -> contextlib.AbstractContextManager[Any]:
 def block(across: int) -> meshes.TetMesh:
     line = np.linspace(-0.05, 0.05, across + 1)
     return meshes.extrude(line, line, np.linspace(-0.02, 0, across // 4 + 1))
+
+
+def problem(mesh: meshes.TetMesh, **material: Any) -> Problem:
+    return Problem(nodes=np.array(mesh.points), cells=np.array(mesh.tets), **material)
 
 
 def each_code(run: Callable[..., tuple], *given: Any) -> Iterator[tuple]:
