@@ -38,14 +38,13 @@ def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
 
 
 def write_scenes(folder: Path) -> None:
-    """Write the examples, and random slabs."""
-    from bench.plans import each_scene, is_slab
+    """Write the examples, and random slabs and sheets."""
+    from bench.plans import random_layer
     from skinwave.scene.file import dumps
 
     folder.mkdir(parents=True)
     texts = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.toml")}
-    for k, scene in enumerate(each_scene(PLANNED, 0, is_slab, lambda _k, scene, _limit: scene)):
-        texts[f"planned-{k:02}"] = dumps(scene)
+    texts |= {f"planned-{k:02}": dumps(random_layer(k)[0]) for k in range(PLANNED)}
     for name, text in texts.items():
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
 

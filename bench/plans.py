@@ -6,7 +6,7 @@ bench/README.md explains each table.
 import argparse
 import contextlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import count, islice
 from typing import Any
@@ -33,7 +33,7 @@ from skinwave.typing import Array, Floats
 MOST = 1.1  # times the stated error
 SLOWEST = 20.0  # s of CPU time of a plan or a reference: slower scenes are left out
 REFERENCE = 1e-4  # relative error of the reduction of a reference
-FINEST, MOST_CELLS = 0.7, 3000  # of a reference: size over the default size, and cells of that size
+FINEST = 0.7  # of the default element size
 COARSER = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
 TOLERANCES = (0.03, 0.05, 0.10, 0.20)
 MOST_MODES = 120, 170  # of references of sheets, in the shortest and in the longest steps
@@ -53,26 +53,29 @@ SHEETS = {
 }  # fmt: skip
 
 
-def each_scene(
-    number: int, seed: int, suits: Callable[[Scene], bool], call: Callable[[int, Scene, float], Any]
-) -> list[Any]:
-    """Return the values of a call for random scenes that suit, with their numbers and tolerances,
-    without scenes that are refused or take too long.
-    """
-
-    def values() -> Iterator[Any]:
-        for k in count():
-            with contextlib.suppress(ValueError, TooSlow):
-                scene = from_table(random_scene(k, seed))
-                if suits(scene):
-                    yield call(k, scene, TOLERANCES[k % len(TOLERANCES)])
-
-    return [*islice(values(), number)]
-
-
-def is_slab(scene: Scene) -> bool:
-    """Return whether the body of a scene is a slab under a pressure."""
-    return scene.body.kind == "slab" and scene.load.kind == "pressure"
+def random_layer(seed: int) -> tuple[Scene, float]:
+    """Return a random scene with a slab or a sheet, and a tolerance."""
+    pick = np.random.default_rng(seed)
+    shape = str(pick.choice(["point", "line", "circle", "square"]))
+    size, speed = pick.uniform(6, 20), pick.uniform(4, 14)
+    am = pick.choice([0.0, pick.uniform(60, 240)])
+    body: dict[str, Any]
+    if pick.random() < 0.4:
+        side, young, loss = (pick.uniform(*ends) for ends in ((60, 120), (2e9, 6e9), (0.02, 0.08)))
+        body = {"kind": "sheet", "size_x_mm": side, "size_y_mm": side, "thickness_mm": 0.1}
+        material = {"density_kg_m3": 800, "young_modulus_pa": young, "poisson": 0.3,
+                    "loss_factor": loss}  # fmt: skip
+    else:
+        shear, viscosity, depth = (pick.uniform(*ends) for ends in ((8e3, 50e3), (3, 10), (8, 15)))
+        body = {"kind": "slab", "size_x_mm": 50, "size_y_mm": 50, "thickness_mm": depth,
+                "sides": str(pick.choice(["absorbing", "clamped", "free"]))}  # fmt: skip
+        material = {"density_kg_m3": 1000, "shear_modulus_pa": shear, "poisson": 0.499,
+                    "viscosity_pa_s": viscosity}  # fmt: skip
+    tacton = {"shape": shape, "size_mm": size, "speed_m_per_s": speed, "duration_s": 0.3,
+              "am_frequency_hz": am if shape != "point" else max(am, 80.0)}  # fmt: skip
+    probes = {"points_mm": [[0, 0], [5, 0], [10, 0]]}
+    keys = {"name": f"random {seed}", "tacton": tacton, "body": body | {"material": material}}
+    return from_table(keys | {"probes": probes}), float(pick.choice(TOLERANCES))
 
 
 def error(found: Array, expected: Array) -> float:
@@ -101,18 +104,21 @@ def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> t
 def stated(number: int, seed: int) -> None:
     """Print the stated and the true error of scenes with solid bodies."""
 
-    def suits(scene: Scene) -> bool:
-        body = scene.body
-        return body.kind != "sheet" and np.isfinite(body.depth) and body.sides != "absorbing"
-
-    def errors(k: int, scene: Scene, tolerance: float) -> tuple[float, float]:
-        body, (found, true) = scene.body, stated_and_true(scene, tolerance)
-        row(k, body.kind, len(body.layers), f"{body.base}, {body.sides}", f"{tolerance:.0%}",
-            f"{found:.2%}", f"{true:.2%}", f"{true / found:.2f}")  # fmt: skip
-        return found, true
+    def pairs() -> Iterator[tuple[float, float]]:
+        for k in count():
+            with contextlib.suppress(ValueError, TooSlow):  # refused, or too large
+                scene, tolerance = from_table(random_scene(k, seed)), TOLERANCES[k % 3]
+                body = scene.body
+                if body.kind == "sheet" or np.isinf(body.depth) or body.sides == "absorbing":
+                    continue
+                found, true = stated_and_true(scene, tolerance)
+                errors = (f"{each:.2%}" for each in (tolerance, found, true))
+                sides = f"{body.base}, {body.sides}"
+                row(k, body.kind, len(body.layers), sides, *errors, f"{true / found:.2f}")
+                yield found, true
 
     row = table("scene", "kind", "layers", "base, sides", "limit", "stated", "true", "ratio")
-    found, true = np.transpose(each_scene(number, seed, suits, errors))
+    found, true = np.transpose([*islice(pairs(), number)])
     low, middle, high = np.quantile(found / true, [0.1, 0.5, 0.9])
     print(f"{(true > MOST * found).sum()} of {number} fail; stated over true error {middle:.2f} "
           f"in the median, {low:.2f} to {high:.2f} in eight of ten")  # fmt: skip
@@ -131,16 +137,18 @@ def cheapest(scene: Scene, tolerance: float, reference: Array) -> tuple[str, flo
     return "none", np.inf
 
 
-def cost(number: int, seed: int) -> None:
+def cost(number: int, first: int) -> None:
     """Print the error and the time of planned responses, and of the cheapest candidate."""
-
-    def verdicts(k: int, scene: Scene, tolerance: float) -> tuple[bool, bool, bool]:
-        body, h = scene.body, FINEST * default_size(scene.body)
-        far = replace(body, width=2 * body.width, height=2 * body.height)
-        fine = replace(scene, body=far) if body.sides == "absorbing" else scene
-        if fine.body.width * fine.body.height * body.depth > MOST_CELLS * h**3:
-            raise ValueError("too large")
-        reference = compute(fine, "fem", h=h, progress=limited(SLOWEST)).values
+    row = table("body", "path", "f_AM, Hz", "limit", "error", "chosen", "s", "planning, s",
+                "cheapest in tolerance", "s", "ratio", "with")  # fmt: skip
+    counts = np.zeros(3, int)
+    for seed in range(first, first + number):
+        scene, tolerance = random_layer(seed)
+        body, tacton = scene.body, scene.tacton
+        scale = 2 if body.sides == "absorbing" else 1
+        far = replace(body, width=scale * body.width, height=scale * body.height)
+        fine = replace(scene, body=far)
+        reference = compute(fine, "fem", h=FINEST * default_size(body)).values
         chosen, planning = timed(plan, scene, SolveOptions(tolerance=tolerance))
         response, seconds = timed(solve_as_planned, scene, chosen)
         if chosen.prepared:  # the time of a reduction during planning counts for the response
@@ -148,23 +156,10 @@ def cost(number: int, seed: int) -> None:
         wrong = error(response.values, reference)
         name, least = cheapest(scene, tolerance, reference)
         ratios = seconds / least, (seconds + planning) / least
-        row(
-            k,
-            body.sides,
-            f"{tolerance:.0%}",
-            f"{wrong:.2%}",
-            chosen.model,
-            f"{seconds:.1f}",
-            f"{planning:.1f}",
-            name,
-            f"{least:.1f}",
-            *(f"{each:.1f}" for each in ratios),
-        )
-        return wrong <= tolerance, ratios[0] <= 5, ratios[1] <= 5
-
-    row = table("scene", "sides", "limit", "error", "chosen", "s", "planning, s",
-                "cheapest in tolerance", "s", "ratio", "with")  # fmt: skip
-    counts = np.sum(each_scene(number, seed, is_slab, verdicts), axis=0)
+        row(f"{body.kind}, {body.sides}", tacton.trajectory.shape, f"{tacton.am_frequency:.0f}",
+            f"{tolerance:.0%}", f"{wrong:.2%}", chosen.model, f"{seconds:.1f}", f"{planning:.1f}",
+            name, f"{least:.1f}", *(f"{each:.1f}" for each in ratios))  # fmt: skip
+        counts += [wrong <= tolerance, *(each <= 5 for each in ratios)]
     print(f"{counts[0]} of {number} within the tolerance; {counts[1]} at no more than five times "
           f"the cheapest, {counts[2]} with planning")  # fmt: skip
 
