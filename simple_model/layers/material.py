@@ -47,7 +47,7 @@ class Orthotropy:
     ----------
     young_x, young_y : float, Pa, Young's moduli
     poisson_xy : float, contraction along y under a stress along x, 0 or above
-    shear_xy : float, Pa, or None for sqrt(E_x E_y) / 2 (1 + sqrt(nu_xy nu_yx))
+    shear_xy : float, Pa, or None for sqrt(E_x E_y) / (2 (1 + sqrt(nu_xy nu_yx)))
 
     Raises a ValueError if a value is out of range.
     """
