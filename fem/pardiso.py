@@ -98,7 +98,7 @@ class Pardiso:
             self._run("analyse")
 
     def free_matrix(self) -> None:
-        """Free the matrix, which a Cholesky factor in memory does not need to solve."""
+        """Free the matrix if the factor is in memory, because solving then does not need it."""
         if not self._folders:
             self._values = self._values[:1].copy()
             self._indices, self._indptr = self._indices[:1].copy(), self._indptr[:1].copy()

@@ -177,12 +177,12 @@ def _size(mesh: TetMesh, patch: Ints) -> Floats:
 def fitted_polynomial(
     x: Floats, degrees: Sequence[int] = (3, 2, 1, 0), locality: float = 1.0
 ) -> tuple[Floats, int]:
-    """Fit a polynomial to samples at places x (s, 2 or 3), in element sizes from a point.
+    """Fit a polynomial to samples at positions x (s, 2 or 3) relative to a point, in element sizes.
 
-    The degree is the highest of `degrees` with half as many coefficients as samples. A sample d
-    elements from the point has the weight exp(-locality d^2); 0.7 to 5 were tried. Returns the
-    coefficients (n, s) of `polynomials` per value of each sample, first the value at the point, and
-    the degree.
+    The degree is the first of `degrees` with at most half as many coefficients as samples and a
+    well-conditioned fit, or else the last. A sample d elements from the point has the weight
+    exp(-locality d^2). Returns a matrix (n, s) that maps values of the samples to coefficients of
+    `polynomials`, and the degree. The first coefficient is the value at the point.
     """
     root = np.exp(-locality / 2 * (x**2).sum(axis=1))  # of the weights
     independent = 1e-8  # of the largest singular value

@@ -30,7 +30,7 @@ PathLike = str | os.PathLike[str]
 
 @contextmanager
 def naming(path: PathLike) -> Iterator[None]:
-    """Put the path before the message of a ValueError in one line, unless it is there."""
+    """Raise a ValueError again with its message on one line, after the path unless it has it."""
     try:
         yield
     except ValueError as error:

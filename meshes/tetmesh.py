@@ -28,7 +28,7 @@ FACES = np.array([[1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6], [0, 1, 3, 4, 8, 7], [0
 
 
 class MeshError(ValueError):
-    """Raised for a mesh, surface or file that no elements can be built on."""
+    """Raised for a mesh, surface or file from which no elements can be built."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -39,7 +39,9 @@ def read_nastran(path: Path) -> Any:
                     part.sections.append(str(int(fields[1] or 0)))
                     part.sets.setdefault(part.sections[-1], set()).add(number)
         except (ValueError, IndexError):
-            raise MeshError(f"{path}: wrong numbers on a card {name}; {SAVE_AGAIN}") from None
+            raise MeshError(
+                f"{path}: a card {name} has numbers that cannot be read; {SAVE_AGAIN}"
+            ) from None
     return join_parts(path, [(part, [])])
 
 

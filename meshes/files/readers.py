@@ -242,7 +242,7 @@ def _labelled(path: Path, image: Any) -> Any:
             return cells.threshold(1, scalars=name)
     raise MeshError(
         f"{path} is an image of {image.n_cells:,} voxels, not a body; segment it, and save a "
-        "surface, or whole numbers that are 0 outside the body"
+        "surface, or a label image: whole numbers, 0 outside the body"
     )
 
 

@@ -75,7 +75,10 @@ class Palm:
 
 
 def level_set(palm: Palm, points: ArrayLike) -> Floats:
-    """Return F (n,) in m at points (n, 3), negative inside; near the surface, the distance."""
+    """Return a level-set function (n,) in m at points (n, 3).
+
+    It is negative inside, and near the surface it is about the signed distance.
+    """
     return _field(palm, np.asarray(points, np.float64))[0]
 
 

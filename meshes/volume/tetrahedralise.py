@@ -111,7 +111,7 @@ def _envelope(surface: Surface, h: float, inner: Collection[Surface]) -> float:
 
 
 def check_edge_length(surface: Surface, name: str, length: float) -> None:
-    """Refuse a length in m that exceeds the body, or is less than a thousandth of it."""
+    """Refuse a length in m above the longest side of the body, or below a thousandth of it."""
     longest = float(np.ptp(surface.points, axis=0).max())
     if not 1e-3 * longest <= length <= longest:
         raise MeshError(f"{name} = {length} m must be from {1e-3 * longest:.2g} to {longest:.2g} m")

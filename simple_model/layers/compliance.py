@@ -51,7 +51,8 @@ def half_space(material: Material, *, poisson: float | None = None) -> Complianc
     """Return the compliance of a half-space, G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2
     b_p b_s.
 
-    k_s^2 is divided out, so that G holds at rest; kappa = k_p^2 / k_s^2. `poisson` replaces the
+    b_p^2 = k^2 - k_p^2 and b_s^2 = k^2 - k_s^2 with the wavenumbers k_p and k_s of both waves. Both
+    sides of the fraction are divided by k_s^2, so that G is finite at 0 Hz. `poisson` replaces the
     ratio of the material and may be 0.5.
     """
     nu = material.poisson if poisson is None else poisson

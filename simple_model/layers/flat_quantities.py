@@ -101,7 +101,7 @@ def _in_motion(quantity: Quantity, field: Field, solid: Material | None = None) 
 
 
 def surface_field(quantity: Quantity, compliance: Compliance) -> Field:
-    """A quantity of the normal motion of any surface with a compliance."""
+    """Return the field of a quantity of the normal motion of a surface with a compliance."""
     return _in_motion(quantity, normal_field(compliance))
 
 

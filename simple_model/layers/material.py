@@ -62,8 +62,8 @@ class Orthotropy:
         if not (self.poisson_xy >= 0 and self.poisson < 0.5):
             raise ValueError(
                 f"poisson_xy = {self.poisson_xy} is outside 0 <= poisson_xy < "
-                f"{0.5 * sqrt(self.young_x / self.young_y):.3g}, where the mean of both directions "
-                "is 0.5; use 0.2 to 0.4 for paper"
+                f"{0.5 * sqrt(self.young_x / self.young_y):.3g}, where the geometric mean of "
+                "both directions is 0.5; for paper it is usually 0.2 to 0.4"
             )
 
     @property

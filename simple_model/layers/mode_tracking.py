@@ -41,9 +41,10 @@ class Roots:
 def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots:
     """Sort roots at (f,) rad/s into modes, one in each column, NaN where a mode has no root.
 
-    A root continues another if the trapezoidal rule of k^2, whose derivative is known, leads from
-    one to the other, and if their shapes are alike. The result has at most `most` modes, the least
-    evanescent ones and, if equal, the slowest, at the frequencies with indices `returned` (g,).
+    Two roots at successive frequencies belong to one mode if their k^2 agree with their
+    derivatives (trapezoidal rule) and their shapes are alike. The result has only the frequencies
+    with indices `returned` (g,), and at most `most` modes: those that decay least, and among
+    equals the slowest.
     """
     count = len(omega)
     index = np.full((count, 0), -1)

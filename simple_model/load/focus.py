@@ -62,7 +62,7 @@ class ContactSpot:
 
     @property
     def gaussians(self) -> GaussianSum:
-        """The same as a sum."""
+        """The spot as a sum of one Gaussian."""
         return _one_gaussian(self.width)
 
     def __call__(self, offsets: Floats) -> Floats:

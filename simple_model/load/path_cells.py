@@ -140,7 +140,7 @@ def path_fourier(
 
 
 def harmonics(pressure: MovingPressure) -> Ints:
-    """Orders of the harmonics of `path_fourier` that its cells resolve, ascending."""
+    """Orders of the harmonics of `path_fourier` that the cells of the path resolve, ascending."""
     k = path_cells(pressure).cells.shape[0]
     return np.arange(-((k - 1) // 2), (k + 1) // 2)
 

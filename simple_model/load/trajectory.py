@@ -248,7 +248,7 @@ class Trajectory:
 
 
 def differ(before: Floats, after: Floats) -> Bools:
-    """Whether positions and levels (k, 3) differ."""
+    """Whether each position or level (k, 3) differs by more than `LEAST_JUMP`."""
     place, level = LEAST_JUMP
     apart = np.abs(after - before)
     return (apart[:, :2] > place).any(axis=1) | (apart[:, 2] > level)

@@ -43,7 +43,7 @@ class FreeModes:
         return amplitudes * self.residues
 
     def impulse(self, coordinates: Floats, rates: Floats) -> Complex:
-        """Amplitudes (m, j) of exp(pole t) for initial coordinates (m,), m kg^1/2, and rates."""
+        """Amplitudes (m, j) of exp(pole t) for coordinates (m,) in m kg^1/2 and their rates."""
         return 2 * self.residues * (self.poles * coordinates[:, None] + rates[:, None])
 
 

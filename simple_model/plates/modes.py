@@ -195,7 +195,8 @@ def plate_modes(
     if (dofs := max(x.size * y.size for x, y in product(*bases))) > most_dofs:
         raise ValueError(
             f"a plate of {1e3 * plate.size_x:g} by {1e3 * plate.size_y:g} mm needs {dofs:,} "
-            f"degrees of freedom, more than {most_dofs:,}; lower finest = {max(resolved):g}"
+            f"degrees of freedom, more than {most_dofs:,}; give a finest below "
+            f"{max(resolved):g} rad/m"
         )
     return PlateModes(plate=plate, families=tuple(_family(plate, x, y) for x, y in product(*bases)))
 

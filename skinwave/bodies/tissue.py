@@ -113,8 +113,8 @@ def in_regions(
     if not body.regions and len(np.unique(region)) > 1:
         raise MeshError(
             f"{source} has several regions, but the scene gives no materials for them: "
-            f"{list_regions(named)}; name those that are not of [body] material in "
-            "[body.regions]"
+            f"{list_regions(named)}; give in [body.regions] the "
+            "material of each region that is not of [body] material"
         )
     merged = np.array(mesh.region)
     numbers = [_number_of(name, named, source) for name, _ in body.regions]

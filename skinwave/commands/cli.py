@@ -120,12 +120,13 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(dest="command_name", metavar="COMMAND")
     for name, module in COMMANDS.items():
-        command = commands.add_parser(name, help=(module.__doc__ or "").rstrip("."))
+        text = module.__doc__ or ""
+        command = commands.add_parser(name, help=text.rstrip("."), description=text)
         module.options(command)
         if name != "convert":  # which does not use the cache
             command.add_argument(
-                "--no-cache", action="store_true", help="do not read or write the cache of meshes, "
-                f"bodies and results, whose folder {CACHE} sets",
+                "--no-cache", action="store_true", help="do not use the cache of meshes, bodies "
+                f"and results (its folder: environment variable {CACHE})",
             )  # fmt: skip
         command.set_defaults(command=module.run)
     return parser

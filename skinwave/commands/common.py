@@ -43,7 +43,10 @@ def add_options(parser: argparse.ArgumentParser, *shared: str) -> None:
             "type": float, "default": 0.05, "metavar": "ERROR",
             "help": "relative error that waveforms may have (default: 0.05)",
         },
-        "--dt": {"type": float, "metavar": "S", "help": "time step of transient models in s"},
+        "--dt": {
+            "type": float, "metavar": "S",
+            "help": "time step of transient models in s (default: by the model)",
+        },
         "--element-size": {
             "dest": "h", "type": float, "metavar": "MM",
             "help": "element size in mm (default: by the plan)",

@@ -28,11 +28,11 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--measured", type=Path, metavar="FILE", help="compare with this measurement of the scene")
     add(
         "--delay", type=float, metavar="MS",
-        help="delay of the record relative to the models in ms (default: fitted)",
+        help="delay of the measurement relative to the models in ms (default: fitted)",
     )  # fmt: skip
     add(
         "--gain", type=float, metavar="G",
-        help="gain of the record relative to the body (default: fitted)",
+        help="gain of the measurement relative to the body (default: fitted)",
     )  # fmt: skip
     common.add_options(parser, "--model", "--element-size", "--solver")
     common.add_output(parser)

@@ -20,7 +20,9 @@ def options(parser: argparse.ArgumentParser) -> None:
     )
     add("--height", type=float, metavar="MM", help="height of the focus above the array in mm")
     add("--hold", action="store_true", help="a focal point stays until the next sample")
-    add("--role", default="modulation", help="meaning of a WAV: modulation (default) or envelope")
+    add(
+        "--role", default="modulation", help="what a WAV contains: modulation (default) or envelope"
+    )
     add(
         "--scale", default="full", help="scale of the samples of a WAV: full (default), peak or rms"
     )
@@ -30,8 +32,8 @@ def options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add("--resize", type=float, default=1.0, metavar="FACTOR", help="multiply the path by a factor")
     add(
-        "--package", default="pyautd3", help="package that plays a script: pyautd3 (default) or "
-        "autd3, 0.12 or later",
+        "--package", default="pyautd3", help="package that a Python script (OUT.py) uses: pyautd3 "
+        "(default) or autd3, 0.12 or later",
     )  # fmt: skip
     add("--overwrite", action="store_true", help="replace an existing file")
     add_options(parser, "--quiet", "--json", "--debug")

@@ -39,7 +39,13 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="data to fit: waveforms (default), complex lines, or amplitudes",
     )  # fmt: skip
     common.add_options(parser, "--model")
-    add("--starts", type=int, default=8, metavar="N", help="starts of the search (default: 8)")
+    add(
+        "--starts",
+        type=int,
+        default=8,
+        metavar="N",
+        help="number of starting points of the search (default: 8)",
+    )
     add("--seed", type=int, default=0, help="seed of the starts (default: 0)")
     add(
         "--inspect", type=Path, metavar="FILE", help="report what a file contains, without a fit: "

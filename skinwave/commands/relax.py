@@ -18,12 +18,12 @@ def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     add = parser.add_argument
     add(
-        "scene", metavar="SCENE", help=f"scene file (TOML), or {BOTH}: which mechanism produces "
-        "which line of the 15 Tactons",
+        "scene", metavar="SCENE", help=f"scene file (TOML), or the word {BOTH}, which tells the "
+        "mechanism of each line of the 15 Tactons",
     )  # fmt: skip
     add(
         "--element-size", dest="h", type=float, metavar="MM",
-        help="element size of all steps in mm",
+        help="element size of all models in mm (default: by the plan)",
     )  # fmt: skip
     add(
         "--update-rate", type=float, default=20.0, metavar="KHZ",

@@ -32,7 +32,8 @@ def options(parser: argparse.ArgumentParser) -> None:
     )
     what.add_argument(
         "--map", action="store_true",
-        help="write only a map: RMS of the quantity of the probes over the body, at their depth",
+        help="write only a map of the RMS over the body, of the quantity and at the depth of the "
+        "probes",
     )  # fmt: skip
     add(
         "--style", choices=("report", "talk", "print"), default="report",
@@ -55,7 +56,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--camera", choices=("tilted", "front", "top"), help="camera of a film (default: tilted)")
     add(
         "--frames", type=int, metavar="N",
-        help="frames of a film (default: as many as its fastest strong line needs)",
+        help="frames of a film (default: enough for its fastest strong line)",
     )  # fmt: skip
     add("--reach", type=float, metavar="MM", help="half width of a map (default: 30 mm)")
     add("--step", type=float, metavar="MM", help="grid step of a map (default: 1 mm)")

@@ -25,21 +25,24 @@ def options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add(
         "--vary", action="extend", nargs="+", metavar="KEY=VALUES", default=[],
-        help="keys to vary: tacton.speed_m_per_s=1:12:12, body.thickness_mm=10,15, "
-        "body=skin-slab,palm; for lhs and sobol start:stop, normal(25e3,0.3), lognormal, factor, "
-        "uniform or triangular",
+        help="keys to vary: tacton.speed_m_per_s=1:12:12 (start:stop:number), "
+        "body.thickness_mm=10,15, body=skin-slab,palm; for lhs and sobol start:stop, "
+        "normal(25e3,0.3), lognormal, factor, uniform or triangular",
     )  # fmt: skip
-    add("--design", default="factorial", help="factorial (default), zip, lhs or sobol")
+    add(
+        "--design", default="factorial", help="factorial (default: all combinations), zip (values "
+        "side by side), lhs (Latin hypercube) or sobol (Sobol indices)",
+    )  # fmt: skip
     add(
         "--samples", type=int, metavar="N",
-        help="runs of lhs, rows of each matrix of sobol, or samples for the interval of --best "
-        "(default: 199)",
+        help="number of samples: runs of lhs, rows of each matrix of sobol (both need it), or "
+        "samples for the intervals of --best (default there: 199)",
     )  # fmt: skip
     add("--seed", type=int, default=0, help="seed of the samples (default: 0)")
     add(
         "--best", metavar="COLUMN",
-        help="find the values of one or two varied keys at which a column such as level_db[0] is "
-        "largest, and their 95 %% intervals under the distributions of the scene; --plot draws it",
+        help="find the values of one or two varied keys that make a column such as level_db[0] "
+        "largest, with 95 %% intervals from the distributions of the scene; --plot draws it",
     )  # fmt: skip
     add("-o", "--out", type=Path, metavar="DIR", help="folder of the table")
     add(
@@ -54,7 +57,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     add("--csv", action="store_true", help="also write rows.csv")
     add(
         "--all-columns", action="store_true",
-        help="write columns with one value in all rows, too, which are otherwise in the metadata",
+        help="also write columns with the same value in all rows (default: only in the metadata)",
     )  # fmt: skip
     add(
         "--waveforms", action="store_true",
@@ -63,10 +66,14 @@ def options(parser: argparse.ArgumentParser) -> None:
     add(
         "--plot", nargs="*", metavar="COLUMN",
         help="draw columns of the table into the folder figures: peak_um (default), level_db, "
-        "f_AM_um[2] for one probe",
+        "f_AM_um[2] for one probe, counted from 0",
     )  # fmt: skip
     add("--x", metavar="KEY", help="key of the horizontal axis (default: the one with most values)")
-    add("--by", metavar="KEY", help="key with a curve for each value (default: the next one)")
+    add(
+        "--by",
+        metavar="KEY",
+        help="key with a curve for each value (default: the one with next most values)",
+    )
     add("--heat", action="store_true", help="draw a map over --x and --by")
     add(
         "--format", choices=("png", "svg", "pdf"), default="png",

@@ -26,8 +26,8 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--hand", type=Path, metavar="FILE",
         help="with --published: also compute the decay along a finger of this hand by finite "
-        "elements, in minutes; the palm faces -x, as in examples/hand/generic-hand-right.glb of "
-        "the repository",
+        "elements (takes minutes); the palm faces -x, as in examples/hand/generic-hand-right.glb "
+        "of the repository",
     )  # fmt: skip
     add_output(parser)
 

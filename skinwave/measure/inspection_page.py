@@ -29,7 +29,7 @@ NO_LINES = "No line rises above the noise floor."
 
 
 def write(folder: Path, inspection: Inspection) -> None:
-    """Write index.html, measured.png, found-lines.csv, measurement.npz and, if small, .csv."""
+    """Write index.html, measured.png, found-lines.csv, measurement.npz and a CSV file if small."""
     measured = inspection.measured
     (folder / "measurement.npz").write_bytes(writing.to_npz(measured))
     most_cells = 2_000_000  # of a CSV file

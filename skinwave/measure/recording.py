@@ -278,7 +278,10 @@ def _even_times(times: Floats) -> tuple[Floats, np.ndarray]:
         steps_s = f"{steps.min():g} to {steps.max():g} s"
         raise ValueError(f"times must rise in equal steps, not {steps_s}; if rounded, give --rate")
     if (missing := index[-1] + 1 - len(index)) > LARGEST_GAPS * len(index):
-        raise ValueError(f"{missing} rows are missing among {len(index)}; give a part without gaps")
+        raise ValueError(
+            f"{missing} rows are missing between the {len(index)} that the file has; give a part "
+            "without gaps"
+        )
     full = start + step * np.arange(index[-1] + 1)
     if away <= UNEVEN * step:
         full[index] = times

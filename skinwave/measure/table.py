@@ -405,5 +405,8 @@ def _arrange(values: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
         twice = int(np.setdiff1d(np.arange(len(values)), row)[0])
         raise ValueError(f"row {twice + 1} repeats the time and place of another row; remove one")
     if total != len(values):
-        raise ValueError(f"times, places and repetitions need {total} rows, not {len(values)}")
+        raise ValueError(
+            f"a row for each time, place and repetition makes {total} rows, but there are "
+            f"{len(values)}; export all of them"
+        )
     return np.asarray(values[row].reshape(shape))

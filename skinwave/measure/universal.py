@@ -142,7 +142,9 @@ def _function(block: bytes) -> Function:
         label = cells(10, 25, 21)[1]
         values = _numbers(block[head.end() :], form, cells(1, 7, 6, 6))
     except ValueError as error:
-        problem = str(error) if "export" in str(error) else "a set 58 has a damaged header or value"
+        problem = (
+            str(error) if "export" in str(error) else "a dataset 58 has a damaged header or value"
+        )
         raise ValueError(f"{problem.partition('; ')[0]}; export it again as text") from None
     is_complex = form in (5, 6)  # types of values
     parts = 1 + is_complex + (not is_even)

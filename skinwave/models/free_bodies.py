@@ -147,8 +147,8 @@ def _is_sprung(body: Body, build: Build) -> bool:
         return sprung
     if "clamped" in body.conditions and "xyz" not in build.fixed.values():
         raise ValueError(
-            "a hand with free materials cannot have both an elastic base and clamped ends, whose "
-            "springs scale with its modulus; reduce it for each material"
+            "a hand with free materials cannot have both an elastic base and clamped ends, because "
+            "only the springs of the ends scale with the modulus; reduce the body for each material"
         )
     return False
 

@@ -205,8 +205,8 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
     kind = body.of_kind
     if kind.morph is None and kind.equivalent is None:
         raise ValueError(
-            f"'{keys[0].key}' cannot be free, because no mesh of a {body.kind} follows its "
-            "thickness; free that of a slab, disc or sheet, or reduce a body for each value"
+            f"'{keys[0].key}' cannot be free, because the mesh of a {body.kind} cannot be scaled "
+            "in thickness; use a slab, disc or sheet, or reduce a body for each value"
         )
     if len(keys) > 2:
         raise ValueError(

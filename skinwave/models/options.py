@@ -25,14 +25,15 @@ class SolveOptions:
     Parameters
     ----------
     model : str, a name of `models.names()`; "auto" selects the cheapest within the tolerance
-    tolerance : float, 0 to 1, acceptable relative error; at most a fiftieth is due to reduction
-    h : float, m, element size; if not given, it and the extent of the body are planned
+    tolerance : float, 0 to 1, acceptable relative error; reduction may use a fiftieth of it
+    h : float, m, element size; if not given, a plan chooses it and the modelled part of the body
     dt : float, s, time step of "fem-transient" and the nonlinear models; chosen if not given
     band : float, Hz up to which a reduced-order model meets its tolerance; a plan raises it for
         stiff bodies under faster loads
     solver : str, a backend of `fem.linear_solver`, or "auto"
     times : (t,) float, s, equally spaced within the duration, the first a multiple of their step;
-        10 kHz over the whole duration if not given. Lines above half their rate are left out
+        by default 10,000 samples per second over the whole duration. Spectral lines above half the
+        sampling rate are left out
     progress : called with the name of the phase and the fraction done
 
     Raises

@@ -101,12 +101,12 @@ class ReducedBody:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedResponse:
-    """Response from rest in reduced coordinates, or at outputs in m.
+    """Response from rest, in reduced coordinates or as displacement in m at outputs.
 
     The steady state has complex `lines` (f, q) at `frequencies` (f,) in Hz. The free vibration
     after the start has complex amplitudes `start` (m, q) at `poles` (m,) in 1/s. `imbalance` is the
-    relative error of the energy balance, and `radiated` the share of absorbing boundaries in the
-    losses.
+    relative error of the energy balance, and `radiated` the share of the losses that is
+    due to absorbing boundaries.
     """
 
     frequencies: Floats

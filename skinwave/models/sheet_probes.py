@@ -60,7 +60,7 @@ def modal_reader(
     body: Body, build: Build, modes: StretchingModes, operators: fem.Operators, probes: Floats,
     reading: Reading, solver: str,
 ) -> Reader:  # fmt: skip
-    """Return a function from coordinates (r,) of bending modes to components (p c,)."""
+    """Return a function from modal coordinates (r,) to the c components at p probes (p c,)."""
     quantity = reading.record
     if quantity.is_normal:
         normal = fem.probe_operator(build.mesh, probes) @ modes.basis

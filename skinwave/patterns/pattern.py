@@ -134,8 +134,9 @@ def thin(t: Floats, places: Floats, levels: Floats) -> np.ndarray:
 
 
 def loudness(pressure: MovingPressure, t: ArrayLike) -> Floats:
-    """Return the sound pressure (...) of each focus at times (...) in s relative to full drive: the
-    root of the radiation pressure, without the levels of a recording.
+    """Return the sound pressure (...) of each focus at times (...) in s relative to full drive.
+
+    It is the square root of the relative radiation pressure, without the levels of a recording.
 
     Raises a ValueError if the radiation pressure is negative.
     """

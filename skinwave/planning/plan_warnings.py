@@ -125,8 +125,8 @@ def _count_unresolved(pressure: MovingPressure, seconds: float, dt: float) -> in
 def implausible(scene: Scene) -> tuple[str, ...]:
     """Warn of numbers that probably have another unit, and of a probe that is given twice."""
     warnings = [
-        f"{key} = {value:g} is implausible; {whose} {low:g}{EN_DASH}{high:g}{unit}, so check "
-        f"{'whether it is a quality factor Q: write 1 / Q' if 'loss' in key else 'its unit'}"
+        f"{key} = {value:g} is implausible: {whose} usually {low:g}{EN_DASH}{high:g}{unit}; "
+        f"{'if it is a quality factor Q, write 1 / Q' if 'loss' in key else 'check its unit'}"
         for key, value, whose, low, high, unit in sorted({*_with_ranges(scene)})
         if 0 < value < low or high < value < np.inf
     ]
@@ -143,25 +143,32 @@ def _with_ranges(scene: Scene) -> Iterator[WithRange]:
     body, kind, trajectory = scene.body, scene.body.of_kind, scene.tacton.trajectory
     if scene.load.of_kind.is_of_device:
         path = 1e3 * float(np.ptp(trajectory.outline, axis=0).max())
-        yield "size_mm" if trajectory.size else "points_mm", path, "paths have", 0.5, 1e3, " mm"
-        yield "speed_m_per_s", trajectory.speed, "paths have", 0, 340, " m/s"
+        yield (
+            "size_mm" if trajectory.size else "points_mm",
+            path,
+            "sizes of paths are",
+            0.5,
+            1e3,
+            " mm",
+        )
+        yield "speed_m_per_s", trajectory.speed, "speeds are", 0, 340, " m/s"
     farthest = 1e3 * float(np.abs(scene.probes).max())
     yield "points_mm", farthest, "the farthest probes are at", 0.1, 1e4, " mm"
     if not kind.discretise:
         return
     densities = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium
     for solid in body.solids:
-        yield "density_kg_m3", solid.density, "solids have", *densities, " kg/m³"
-        yield "shear_modulus_pa", solid.shear_modulus, "solids have", 100, 1e12, " Pa"
-        yield "loss_factor", solid.loss_factor, "solids have", 0, 2, ""
+        yield "density_kg_m3", solid.density, "densities are", *densities, " kg/m³"
+        yield "shear_modulus_pa", solid.shear_modulus, "moduli are", 100, 1e12, " Pa"
+        yield "loss_factor", solid.loss_factor, "loss factors are", 0, 2, ""
     thinnest = 1e-3 if kind.is_plate else 0.1
     for layer in body.layers:
-        yield "thickness_mm", 1e3 * layer.thickness, "layers have", 1e-3, 1e3, " mm"
+        yield "thickness_mm", 1e3 * layer.thickness, "layers are", 1e-3, 1e3, " mm"
     if not kind.is_bounded:
         return
-    yield "thickness_mm", 1e3 * body.depth, f"bodies of kind {kind.name} have", thinnest, 1e3, " mm"
+    yield "thickness_mm", 1e3 * body.depth, f"bodies of kind {kind.name} are", thinnest, 1e3, " mm"
     for key, side in (("size_x_mm", body.width), ("size_y_mm", body.height)):
-        yield key, 1e3 * side, "bodies have", 1, 1e4, " mm"
+        yield key, 1e3 * side, "bodies are", 1, 1e4, " mm"
 
 
 def rigid_body_drift(scene: Scene) -> tuple[str, ...]:

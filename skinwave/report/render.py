@@ -297,7 +297,7 @@ def add_scale_bar(plotter: Any, points: Floats, style: Style, letter: float) -> 
 
 
 def add_label(plotter: Any, text: str, place: Floats, letter: float, ink: str) -> None:
-    """Write text to the right of a place (3,) in mm, with letters of so many pixels."""
+    """Write text to the right of a place (3,) in mm, with letters of `letter` pixels."""
     plotter.add_point_labels(
         place[None], [text], font_size=round(letter), font_file=findfont("DejaVu Sans"),
         text_color=ink, shape=None, show_points=False, always_visible=True,

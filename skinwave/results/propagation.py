@@ -1,11 +1,12 @@
 """Effect of propagation: a body's motion compared with the point kernel under the same load.
 
-- Share outside: integral of squared RMS motion where the kernel's RMS is 20 dB below its largest,
-  over the integral everywhere, both within 44 mm of the origin along x and y.
+- Share outside: integral of squared RMS motion where the kernel's RMS is below -20 dB of its
+  largest, over the integral everywhere, both within 44 mm of the origin along x and y.
 - Half: distance from the path within which that integral has half its value.
 - Spread: largest distance from the path at which the RMS is within 6 dB of the largest.
-- Level: largest over components of amplitude over detection threshold, while a pulse is on.
-- Reach: largest distance from the path at which a component is above its threshold, likewise.
+- Level: largest ratio of amplitude to detection threshold of a component, while a pulse is on.
+- Reach: largest distance from the path at which a component is above its threshold, while a
+  pulse is on.
 - Phase delay: phase difference of motion and kernel pressure at one probe, over 2 pi f.
 
 All are of the steady vibration about its mean, without free vibration after the start. On a curved
@@ -91,7 +92,7 @@ def propagation(
     """
     if run.scene.pressure != kernel.scene.pressure:
         raise ValueError(
-            f"{run.column} and {kernel.column} have different loads. Compare responses to one load"
+            f"{run.column} and {kernel.column} have different loads; compare responses to one load"
         )
     strongest, of_kernel = strongest_component(run), strongest_component(kernel)
     effect = Propagation(

@@ -98,7 +98,7 @@ class Run(OfTacton):
 
     @cached_property
     def frequencies(self) -> dict[str, float]:
-        """Frequencies in Hz by name; coinciding lines have all names that claims use."""
+        """Frequencies in Hz by name; a line is listed under every name that claims use for it."""
         return {name: self.line_hz[own] for name, own in self._own.items()}
 
     @cached_property
@@ -137,7 +137,10 @@ class Run(OfTacton):
 
 
 def own_names(scene: Scene, listed: Mapping[str, float]) -> dict[str, str]:
-    """Return the listed name of each listed name, and of names in `ASSESSED` at its frequency."""
+    """Return the name in `listed` of each name of a line.
+
+    Listed names map to themselves, names in `ASSESSED` to the listed line at the same frequency.
+    """
     same = SAME_LINE / scene.tacton.duration
     own = {name: name for name in listed}
     for name in ASSESSED:

@@ -283,7 +283,7 @@ def load(path: Path, scene: Scene) -> SurfaceField:
         x, y, rms = (values[name] for name in ("x", "y", "rms"))
         shapes = {values.get(name, rms).shape for name in ("rms", *OPTIONAL)}
         if x.ndim != 1 or shapes != {(*y.shape, *x.shape)} or not np.isfinite(rms).any():
-            raise ValueError(f"'rms' has shape {rms.shape} or no finite value")
+            raise ValueError(f"'rms' has the shape {rms.shape}, or none of its values is finite")
         depth, note = float(arrays["depth"]), str(arrays["note"])
     except (KeyError, TypeError, ValueError) as error:
         raise ValueError(

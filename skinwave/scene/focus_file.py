@@ -107,7 +107,7 @@ def _read(path: Path) -> Iterator[tuple[Column, np.ndarray]]:
         return
     table = parse_table(reading.read_exported_text(path), "x [mm],y [mm],p_rms [Pa]", _heading)
     if not any(column.text for column in table.columns):
-        raise ValueError(f"the file has no line of names above its numbers; {MUST}")
+        raise ValueError(f"the file has no header above its numbers; {MUST}")
     yield from zip(table.columns, table.numbers.T, strict=True)
 
 

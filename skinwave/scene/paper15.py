@@ -23,8 +23,8 @@ def tactons() -> Iterator[tuple[str, Tacton]]:
 
 
 def scenes(name: str, tacton: Tacton, bodies: Mapping[str, Body] | None = None) -> dict[str, Scene]:
-    """Return scenes of one Tacton: by both point kernels and, under the same load, on bodies by
-    name.
+    """Return scenes of one Tacton by name: one of each point kernel, and one of each body under the
+    load of `point-kernel`.
 
     The default bodies are the paper sheet and skin.
     """

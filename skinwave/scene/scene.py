@@ -160,9 +160,10 @@ class Scene:
         if not body.is_held:
             raise ValueError(f"{motion.words} does not move an unconstrained body; clamp its base")
         if "absorbing" in (body.base, *body.conditions):
+            key = "base" if body.base == "absorbing" else "sides"
             raise ValueError(
-                f"{motion.words} needs sides that do not absorb, because the tissue beyond them "
-                'is at rest; use sides = "free" or "clamped"'
+                f'{motion.words} is not possible with {key} = "absorbing", because the tissue '
+                f'beyond is at rest; use {key} = "clamped"'
             )
 
     def _check_extent(self) -> None:

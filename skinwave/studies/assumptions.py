@@ -36,8 +36,8 @@ ASSUMPTIONS = {
     "sinc^2 profile": "the focal spot is a Gaussian of the same half width",
     "no propagation": "waves propagate in an infinite flat body under the same load",
     "little loss": "the material has its full damping",
-    "viscous loss": "the damping is that of a standard linear solid, which equals the viscous one "
-    "at the strongest line only",
+    "viscous loss": "the material is a standard linear solid, whose damping equals the viscous one "
+    "only at the strongest line",
     "laterally-infinite": "the body has its own shape, size and supports",
     "one material": "the body has layers",
     "alike in all directions": "stiffness and tension of the sheet differ by direction",

@@ -17,7 +17,7 @@ from skinwave.system.table import Table
 from skinwave.typing import Floats
 
 Effects = Mapping[str, Mapping[str, Propagation]]  # by Tacton and column
-NOT_SKIN = "thresholds are known of skin only"
+NOT_SKIN = "thresholds are known only for skin"
 OF_PRESSURE = "none (a pressure)"
 
 
@@ -145,10 +145,9 @@ def sentences(effects: Effects, groups: Mapping[str, Sequence[Run]]) -> list[str
     if gains[most]:
         others = _in_words([f"{label(c)}: {len(own)}" for c, own in gains.items() if c != most])
         parts.append(
-            f"On the {label(most)} the strongest line is another than the kernel's in "
-            f"{len(gains[most])} of {len(effects)} Tactons{f' ({others})' * bool(others)}, because "
-            f"resonances amplify it {_text(np.array(gains[most]), 'times')} as much as the "
-            "kernel's."
+            f"In {len(gains[most])} of {len(effects)} Tactons{f' ({others})' * bool(others)} the "
+            f"strongest line on the {label(most)} is not that of the kernel: resonances amplify it "
+            f"{_text(np.array(gains[most]), 'times')} as much as the kernel's strongest line."
         )
     return parts
 

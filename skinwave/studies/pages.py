@@ -151,10 +151,10 @@ def page_of(
     verdict: list[str] = []
     about_numbers = (
         "Medians over the Tactons, with the smallest and the largest value in brackets. In the "
-        "picture each dot is a Tacton, and a bar the median. Half of the motion: of the integral "
-        "of squared RMS. A reach ends at the edge of the map or of the body. The delay is that of "
-        "the kernel's strongest line in motion relative to pressure, at the probe nearest to the "
-        "path, known up to whole periods; below 0 the body is ahead."
+        "picture each dot is a Tacton, and a bar the median. Half of the motion is half of the "
+        "integral of squared RMS. A reach cannot exceed the map or the body. The delay compares "
+        "motion with pressure in the kernel's strongest line, at the probe nearest to the path. "
+        "Whole periods may be missing. If it is negative, the motion is ahead."
     )
     if first:
         if is_single:
@@ -164,7 +164,7 @@ def page_of(
             verdict = [*overview.sentences(effects, groups), *sentences(first)[1:]]
             dots = overview.figure(effects, gallery.style)
             numbers = gallery.figure("numbers", dots, about_numbers)
-            detail = Section(f"One of them: {first.kernel.tacton}", own)
+            detail = Section(f"One Tacton: {first.kernel.tacton}", own)
             parts = [overview.table(effects), numbers, parts[0], *spatial, detail, *parts[1:]]
     return Report(title, [" ".join(verdict)], parts, efforts_of(runs), "pictures", gallery.failures)
 
@@ -218,9 +218,9 @@ def _body_parts(at_rest: "Mapping[Run, Callable[[], Any]]", gallery: Gallery) ->
         return [Section("The body", [f"Its picture is left out: {renderer().detail}."])]
     parts: list[Part] = []
     body_caption = (
-        "at rest, with its mesh and its boundary conditions. Where a support begins smoothly, its "
-        "colour fades in. The plate below shows the condition of the base. A body of several "
-        "materials is cut open."
+        "at rest, with its mesh and its boundary conditions. Where the stiffness of a support "
+        "rises gradually, its colour fades in. The plate below shows the condition of the base. A "
+        "body of several materials is cut open."
     )
     for run, drawn in at_rest.items():
         from skinwave.report.body_picture import drawn_size  # slow to import
@@ -352,9 +352,9 @@ def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
         "Inside the pink line the strongest component is above the detection threshold of skin."
     )
     measured_caption = (
-        "Squares show the measured RMS in the colours of the map: the lines of the load, "
-        "converted to displacement, without gain. An arrow on a colour bar means that a measured "
-        "value is larger. On the kernel's map, a pressure, squares only show the places."
+        "Squares show the measured RMS displacement in the colours of the map. It has only the "
+        "lines of the load, and no gain is applied. An arrow on a colour bar means that a measured "
+        "value is larger. The kernel's map shows pressure, so its squares only mark the places."
     )
     if first.maps and first.own[first.body.column].strongest:
         figure = surfaces_figure(
@@ -406,7 +406,7 @@ def _free_vibration(runs: Iterable[Run]) -> str:
         f"{peak.frequency:.0f} Hz"
         for run, peak in strongest.items()
     )
-    return f"Free vibration after the start is not included; at the probes: {each}." if each else ""
+    return f"Maps leave out the free vibration after the start. At the probes: {each}." * bool(each)
 
 
 def sentences(first: FirstScreen) -> list[str]:
@@ -436,13 +436,13 @@ def four_numbers(first: FirstScreen) -> Table:
     else:
         rows = [
             ("largest displacement at the probes", None, map(_deflection_text, first.bodies)),
-            (f"reach above {NEAR:g} dB of the largest RMS, from the path",
+            (f"spread within {-NEAR:g} dB of the largest RMS, from the path",
              _distance(effects[0].kernel_spread), (_distance(each.spread) for each in effects)),
         ]  # fmt: skip
     line = effects[0].kernel_strongest
     of_line = f"{line.name} ({line.frequency:.0f} Hz)" if line else "the strongest line"
     rows += [
-        (f"share of motion outside the kernel's {OUTSIDE:g} dB region",
+        (f"share of mean-square motion outside the kernel's {OUTSIDE:g} dB region",
          None if effects[0].share is None else "0 %", map(_share, effects)),
         (f"delay of {of_line}", "0 ms", map(_delay_text, effects)),
     ]  # fmt: skip
@@ -463,13 +463,13 @@ def _deflection_text(run: Run) -> str:
     text, body = run.response.record.text(largest), run.scene.body
     if not body.of_kind.is_plate or named(run.model).is_nonlinear or largest < body.depth / 2:
         return text
-    return f"{text} (invalid: above half the thickness, where the sheet stiffens)"
+    return f"{text} (invalid: above half the thickness, where a real sheet is stiffer)"
 
 
 def _propagation_sentence(first: FirstScreen) -> str:
     effect = first.own[first.body.column]
     if effect.strongest is None:
-        return "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
+        return "Nothing vibrates, because a constant pressure at a fixed focus drives no wave."
     name, line = label(effect.column), effect.strongest
     if effect.share is None:
         return f"The {name} moves most at {line.frequency:.0f} Hz ({line.name})."
@@ -484,15 +484,15 @@ def _propagation_sentence(first: FirstScreen) -> str:
 def _drive_sentence(first: FirstScreen) -> str:
     kernel, published, pressure = first.kernel, first.published, first.kernel.scene.pressure
     if pressure == published.scene.pressure:
-        return "The load is the published one; only propagation differs from the paper's model."
+        return "The load is the published one: only propagation differs from the published model."
     law = f"drive law and focus ({pressure.drive}, {pressure.profile_name})".replace("_", " ")
-    text = f"{law.capitalize()} change amplitudes of lines and add none."
+    text = f"{law.capitalize()} change the amplitudes of lines and add no line."
     if names := added_lines(kernel, published):
-        text = f"{law.capitalize()} make the lines {_first_names(names)}."
+        text = f"{law.capitalize()} add the lines {_first_names(names)} to the published load."
     if not first.added:
-        return f"{text} Linear propagation adds none." if names else text
-    each = (f"{_first_names(own) or 'none'} to the {label(c)}" for c, own in first.added.items())
-    return f"{text} Stretching adds {', '.join(each)}; linear waves add none."
+        return f"{text} Linear propagation adds no line." if names else text
+    each = (f"{_first_names(own) or 'no line'} to the {label(c)}" for c, own in first.added.items())
+    return f"{text} Stretching adds {', '.join(each)}. Linear propagation adds no line."
 
 
 def _first_names(names: Sequence[str]) -> str:
@@ -507,17 +507,18 @@ def _uncertainty(first: FirstScreen) -> str:
     if first.shares:
         low, high = (100 * share for share in first.shares)
         parts.append(
-            f"Over the range of material data, the share outside is {interval(low, high)} %."
+            f"For moduli and losses within their 90 % intervals, the share outside is "
+            f"{interval(low, high)} %."
         )
     if first.body.scene.body.of_kind.is_plate:
         parts.append(
-            "Grammage, stiffness and support of the measured sheet are not published. Detection "
-            "thresholds are those of skin; a sheet has no sensation level."
+            "Lim, Seifi and Park did not publish grammage, stiffness and support of their sheet. "
+            "Detection thresholds are those of skin; a sheet has no sensation level."
         )
     if any(each.above_threshold for each in first.own.values()):
         parts.append(
-            "The pressure is known to a factor of 2; distances in brackets are for half and twice "
-            "the pressure."
+            "The pressure is known only to within a factor of 2. Distances in brackets are for "
+            "half and twice the pressure."
         )
     return " ".join(parts)
 
@@ -575,16 +576,16 @@ def _effects_table(effects: Mapping[str, Mapping[str, Propagation]]) -> list[Par
     ]  # fmt: skip
     table = Table([
         "Tacton", "body", "share outside", "spread, kernel, mm", "spread, body, mm",
-        Column("phase delay of that component", unit="ms", digits=2), "strongest component, kernel",
-        "strongest component, body", "highest sensation level",
+        Column("phase delay of the kernel's strongest component", unit="ms", digits=2),
+        "strongest component, kernel", "strongest component, body", "highest sensation level",
     ], rows)  # fmt: skip
     cells = zip(table.columns, zip(*rows, strict=True), strict=True)
     known = [column.name for column, own in cells if any(cell is not None for cell in own)]
     about_maps = (
         "Shares and spreads come from maps that reach 44 mm from the origin along x and y; areas "
         "and distances on a curved body are those along its surface. The map of a slab is that of "
-        "a laterally infinite layer. The strongest component is the largest over all probes. The "
-        "phase delay, that of the kernel's strongest component, is known up to whole periods, and "
-        "includes the phase lag of the body; below 0 the body is ahead."
+        "a laterally infinite layer. The strongest component is the line with the largest "
+        "amplitude at any probe. Whole periods may be missing from the phase delay. It includes "
+        "the phase lag of the body. If it is negative, the body is ahead."
     )
     return [about_maps, table.only(*known)]

@@ -381,7 +381,7 @@ def _change_text(e: Effect) -> str:
     time = f"{e.seconds:.1f} s more" if e.seconds > 0.05 else "no extra time"  # which rounds to 0
     *first, last = changes
     text = f"{', '.join(first)}, and {last}" if first else last
-    return f"{text}. Then {assumptions.ASSUMPTIONS[e.name]}, which takes {time}."
+    return f"{text}. In its place, {assumptions.ASSUMPTIONS[e.name]}. This takes {time}."
 
 
 def _place(e: Effect) -> str:
@@ -428,7 +428,7 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
         Column("level_db", "change of the sensation level", "dB", 2),
         Column("reach_with_mm", "reach above threshold with it", "mm"),
         Column("reach_without_mm", "reach without it", "mm"),
-        Column("alone_percent", "change if no other assumption is made", "%", 2),
+        Column("alone_percent", "change if only this assumption is made", "%", 2),
         Column("costs_s", "extra time", "s", 2), Column("line", "largest change of a line"),
         "lines_db",
     )  # fmt: skip
@@ -442,12 +442,14 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
     steps = Table(step_columns, map(_step_row, hierarchy.every), "steps")
     introduction = (
         "The steps lead from the published model to the richest one of this scene, one assumption "
-        "after another. A pressure and a displacement are compared after the best-fitting factor."
+        "after another. Before a pressure is compared with a displacement, it is scaled by the "
+        "best-fitting factor."
     )
     bars = (
-        "What changes if each assumption is dropped: the waveform, relative to the motion of the "
-        "strongest probe; and, on skin, the highest sensation level at a probe, and the distance "
-        "from the path up to which a line exceeds the detection threshold."
+        "What changes if each assumption is dropped. The change of the waveform is relative to "
+        "the motion of the strongest probe. On skin, the other two panels show the highest "
+        "sensation level at a probe, and the distance from the path up to which a line exceeds "
+        "the detection threshold."
     )
     parts: list[Part] = [
         Picture(png(_figure(effects, hierarchy.towards), dpi=130), bars, "relax"),
@@ -479,7 +481,7 @@ def _figure(effects: list[Effect], towards: str) -> Figure:
     first.set_yticks(rows, [e.name.replace("^2", "²") for e in effects])
     first.invert_yaxis()
     first.set_xlim(0, 1.2 * max(changes, default=0.0) or 1.0)
-    first.set_xlabel("change of the waveform\nover the motion of the strongest probe")
+    first.set_xlabel("change of the waveform, relative\nto the motion of the strongest probe")
     if is_skin:
         axes, levels = others[0], [e.level or 0.0 for e in effects]
         texts = ["" if e.level is None else decibel(e.level, signed=True) for e in effects]

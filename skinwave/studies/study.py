@@ -214,8 +214,8 @@ def _completeness(model: str) -> int:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BesideRuns:
-    """What a study finds beside its runs: reduced bodies by column, surfaces, runs of flat slabs
-    for comparison by column, and reasons of failed parts.
+    """What a study computes besides its runs: reduced bodies by column, surfaces, runs of flat
+    slabs for comparison by column, and reasons of failed parts.
     """
 
     prepared: dict[str, ReducedBody] = field(default_factory=dict)

@@ -42,7 +42,7 @@ class Table:
         return at[0] if at else -1
 
     def note(self, key: re.Pattern[str]) -> str:
-        """Return the first value of a note whose key matches, or ""."""
+        """Return the first value, if not empty, of a note whose key matches, or ""."""
         return next((value for name, value in self.notes if key.fullmatch(name) and value), "")
 
 
@@ -221,8 +221,10 @@ def _header(above: list[str], layout: _Layout) -> tuple[list[str], list[str], No
     count = len(names) or (0 if units else width)
     delimiter_names = {"\t": "tabs", " ": "white space", ",": "commas", ";": "semicolons"}
     if count and (count <= numeric[-1] or (count > width and not units)):
-        cells = f"{width} cells between {delimiter_names[layout.delimiter]}"
-        raise ValueError(f"line {at[-1] + 2} has {cells}, but the header {count}; name each column")
+        cells = f"{width} cells separated by {delimiter_names[layout.delimiter]}"
+        raise ValueError(
+            f"line {at[-1] + 2} has {cells}, but the header has {count}; name each column"
+        )
     names, units = names + [""] * width, units + [""] * width
     notes += [
         (names[k].lower(), units[k])

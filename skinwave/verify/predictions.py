@@ -162,9 +162,10 @@ def peak(x: Array, y: Array) -> float:
 def along_finger(
     file: Path, progress: Progress, frequencies: Sequence[float], up: str = "-x", h: float = 6.5e-3
 ) -> Floats:
-    """Return 1/e lengths (f,) in m on the palmar side of the longest finger of a hand.
+    """Return 1/e lengths (f,) in m on the palmar side of the longest finger, at (f,) Hz.
 
-    Finite elements of size `h` in m compute them; 5 and 8 mm change them by up to 8 %. The palm in
+    They are computed with finite elements of size `h` in m. Sizes of 5 and 8 mm change them by up
+    to 8 %. The palm in
     the `file` faces `up`. Raises a ValueError if the file is missing or contains no body.
     """
     if not file.is_file():

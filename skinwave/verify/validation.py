@@ -79,7 +79,7 @@ class Compared:
 
     @property
     def outcome(self) -> Outcome:
-        """Where our value lies beside the published one."""
+        """Where our value lies relative to the published one."""
         if isnan(self.factor):
             return "no wave"
         return "within" if self.factor == 1.0 else "above" if self.factor > 1 else "below"

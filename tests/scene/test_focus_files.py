@@ -234,7 +234,7 @@ REFUSED = {
     "not finite numbers": table(NAMES, np.where(np.hypot(X, Y) < 1, np.nan, RMS)),
     "x has no unit": table("x,y [mm],p_rms [Pa]", RMS),
     "'furlong' is not a unit of length": table("x [furlong],y [mm],p_rms [Pa]", RMS),
-    "no line of names": table(NAMES, RMS).split("\n", 1)[1],
+    "no header above its numbers": table(NAMES, RMS).split("\n", 1)[1],
     "no column has a known name": table("x [mm],y [mm],v [Pa]", RMS),
     "2 columns hold the sound pressure": table(NAMES + ",p_rms_pa", RMS, RMS),
     "0 columns hold the imaginary part": table("x [mm],y [mm],Re(p) [Pa]", RMS),
