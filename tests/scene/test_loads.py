@@ -29,6 +29,7 @@ from skinwave.patterns.conversion import write_pattern
 from skinwave.patterns.pattern import Options
 from skinwave.planning.extent import symmetry
 from skinwave.planning.plan import plan
+from skinwave.planning.refinement import about_its_rest
 from skinwave.planning.simulate import compute
 from skinwave.results.run import SUPPORT, Run
 from skinwave.scene.spreads import spreads_of
@@ -514,3 +515,7 @@ def test_gravity_alone_has_the_error_of_its_deflection():
     )
     response = skinwave.simulate(scene, "fem", 0.3, h=6e-3)
     assert 0 < response.expected_error < 0.2
+    wave = np.sin(2 * np.pi * np.arange(40) / 40)[:, None]  # its mean is 0
+    round_off, moving = (1e-6 * (1 + size * wave) for size in (1e-9, 1e-2))
+    np.testing.assert_array_equal(about_its_rest(scene, round_off), round_off)
+    np.testing.assert_allclose(about_its_rest(scene, moving), 1e-8 * wave, rtol=0, atol=1e-20)
