@@ -86,7 +86,7 @@ def main(count: int, bodies: list[str]) -> None:
     with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for body in bodies:
-            data = data_of(bodies=[body], tests=0)
+            data = data_of(bodies=[body], tests=1)
             file = Path(folder, f"{body}.html")
             file.write_text(page(data), encoding="utf-8")
             tab = browser.new_page(viewport={"width": 1280, "height": 800})
