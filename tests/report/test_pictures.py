@@ -36,7 +36,7 @@ from skinwave.report import body_picture, films, maps, render
 from skinwave.report.renderer import Renderer, begin, renderer
 from skinwave.report.spectra import levels_figure, tacton_figure
 from skinwave.report.styles import style
-from skinwave.results import exports, motion, playback, views
+from skinwave.results import motion, playback, views
 from skinwave.results.run import Run
 from skinwave.results.surface import SurfaceField
 from skinwave.scene.file import dumps, loads
@@ -336,7 +336,7 @@ def test_a_sound_has_the_scale_in_its_name(seen, page):
     motion = read_results.arrays(page / "data/skin-slab_probes.npz")["displacement"]
     probe = np.abs(motion - motion.mean(axis=0)).max(axis=0).argmax()
     expected = 1e6 * (motion[:, probe] - motion[:, probe].mean())
-    np.testing.assert_allclose(samples / exports.FULL_SCALE * scale, expected, atol=1e-3 * scale)
+    np.testing.assert_allclose(samples / 32767 * scale, expected, atol=1e-3 * scale)
 
 
 def test_fields_are_opened_again_with_their_times(seen, page):
