@@ -188,7 +188,7 @@ def test_the_delay_is_that_of_the_strongest_line_where_its_pressure_is_largest(p
             * Math.cos(2 * Math.PI * at * delay)), im: f.map((at, l) => -size[l]
             * Math.sin(2 * Math.PI * at * delay)) });
           const kernel = { f, at: (x) => wave([2, 1 + 50 * x], 0) };
-          const waves = { f, at: (x) => wave([1, 2], 1e-3 + 0.1 * x) };
+          const waves = { f, at: (x) => wave([1, 2 - 50 * x], 1e-3 + 0.1 * x) };
           return delayOf(kernel, waves, loadOf(own));
         }""",
         own,
@@ -270,9 +270,14 @@ def test_tables_and_sound(page, starts, tmp_path):
 def test_levels_of_lines_are_those_of_displacement_in_any_quantity(page, starts):
     tables = page.evaluate(
         f"(many) => many.map((own) => linesCsv(({ANSWER})(own)))",
-        [starts | {"quantity": each} for each in ("displacement", "velocity")],
+        [
+            starts | {"drive": "pressure_squared"} | each
+            for each in ({}, {"quantity": "velocity"}, {"pulses": "100/50", "ramp": 10})
+        ],
     )
-    still, moving = ({row[1]: row for row in csv.reader(each.splitlines()[1:])} for each in tables)
+    still, moving, pulsed = (
+        {row[1]: row for row in csv.reader(each.splitlines()[1:])} for each in tables
+    )
     pairs = [(still[f], moving[f]) for f in still.keys() & moving.keys() if still[f][4]]
     assert len(pairs) > 3
     for (_, f, metre, pressure, level), (_, _, speed, *others) in pairs:
@@ -280,6 +285,12 @@ def test_levels_of_lines_are_those_of_displacement_in_any_quantity(page, starts)
         assert float(speed) == pytest.approx(2e-3 * np.pi * float(f) * float(metre), rel=1e-7)
         expected = sensation_level(1e-6 * float(metre), float(f))
         assert float(level) == pytest.approx(expected, abs=1e-6)
+    mean = (80 + 2 * 10 / 3) / 150  # of the squared level of a pulse with two ramps
+    assert pulsed.keys() == still.keys()
+    for f, (_, _, metre, pressure, level) in pulsed.items():
+        given = [mean * float(x) for x in still[f][2:4]]
+        assert [float(metre), float(pressure)] == pytest.approx(given, rel=1e-5)
+        assert level == still[f][4]
 
 
 @pytest.mark.parametrize(

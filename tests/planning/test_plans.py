@@ -359,6 +359,8 @@ def test_lines_beyond_a_third_of_the_tolerance_are_left_out():
 def test_meshes_from_files_are_compared_by_their_elements_under_the_focus():
     coarse, fine = Effort(cells=1000, h=0.01), Effort(cells=1728, h=0.005)
     assert refinement_ratio(Body(kind="palm"), coarse, fine) == pytest.approx(1.2)
+    flat = replace(fine, cells=1440)  # a sheet has one layer of cells
+    assert refinement_ratio(Body(kind="sheet"), coarse, flat) == pytest.approx(1.2)
     scan = Body(kind="mesh", file="hand.stl")
     assert refinement_ratio(scan, coarse, fine) == 2
     assert refinement_ratio(scan, coarse, replace(fine, cells=1000)) == 1  # the same mesh

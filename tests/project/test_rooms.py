@@ -1,4 +1,4 @@
-"""Who may import whom, what importing costs, and what the project ships."""
+"""Who may import whom, what importing costs, what the project ships, and deliberate faults."""
 
 import ast
 import re
@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import skinwave
+from bench.faults import faults
 from skinwave.commands.cli import main
 
 ROOT = Path(__file__).parents[2]
@@ -154,3 +155,13 @@ def test_the_packages_are_named_and_typed():
     packages = build["targets"]["wheel"]["packages"]
     assert packages == sorted(ROOMS)
     assert all((ROOT / package / "py.typed").exists() for package in packages)
+
+
+def test_deliberate_faults_apply_and_name_tests():
+    listed = list(faults())
+    lines = (ROOT / "bench/faults.txt").read_text("utf-8").splitlines()
+    # A fault that is not in three lines would be skipped.
+    assert len(listed) == sum(line.startswith("- ") for line in lines) > 100
+    assert [fault.name for fault in listed if not fault.applied()] == []
+    files = {name for fault in listed for name in fault.tests if name.endswith(".py")}
+    assert [name for name in sorted(files) if not (ROOT / name).exists()] == []
