@@ -16,7 +16,7 @@ from skinwave.live.selftest import OF_ELEMENTS, Compared, exact_lines, random_sc
 from skinwave.live.values import control_values
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer as reduced_answer
-from skinwave.models.reduced import prepare
+from skinwave.models.reduced import reduce_scene
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import BODIES, STILL, Scene
 
@@ -129,7 +129,7 @@ def test_a_body_of_elements(page):
     open_body(page, "palm", element_pack(BODIES["palm"], H, training=few))
     lines_of, places = exact_lines(BODIES["palm"], H)
     still = Scene(pressure=STILL, body=BODIES["palm"], probes=places)
-    prepared = prepare(still, SolveOptions(h=H))
+    prepared = reduce_scene(still, SolveOptions(h=H))
 
     def waveform_of(scene):
         return reduced_answer(prepared, scene).values[:, places.index(scene.probes[0])]
