@@ -32,6 +32,7 @@ def with_outputs(text: str) -> str:
     """Return a Markdown page with the outputs of its marked blocks."""
     if "<!-- output" not in text:
         return text
+    close_pictures()  # of others
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         Path("examples").symlink_to(ROOT / "examples")
         return BLOCK.sub(_run, text)
@@ -79,7 +80,6 @@ def _wrapped(line: str) -> str:
 def drawn() -> Iterator[bytes]:
     """Yield the open pictures of matplotlib and pyvista as PNG, and close them."""
     import matplotlib.pyplot as plt
-    from pyvista import close_all
     from pyvista.plotting.plotter import _ALL_PLOTTERS
 
     figures = [plt.figure(number).savefig for number in plt.get_fignums()]
@@ -87,6 +87,14 @@ def drawn() -> Iterator[bytes]:
         file = io.BytesIO()
         save(file)
         yield file.getvalue()
+    close_pictures()
+
+
+def close_pictures() -> None:
+    """Close all pictures of matplotlib and pyvista."""
+    import matplotlib.pyplot as plt
+    from pyvista import close_all
+
     plt.close("all")
     close_all()
 
