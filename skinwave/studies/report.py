@@ -3,7 +3,7 @@
 import io
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from copy import copy
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -103,7 +103,7 @@ def picture_parts(album: Album, gallery: Gallery) -> list[Part]:
     drawn_film: Callable[[], Picture] | None = None
     if renderer().is_available:
         # Copies, because a view keeps what it computes while a thread sends it.
-        copies = replace(own), [replace(view) for view in views]
+        copies = copy(own), [copy(view) for view in views]
         drawn_film = gallery.begin(_film, *copies, gallery.style)
         options = _spatial_parts(own, views, gallery)
     else:

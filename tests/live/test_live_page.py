@@ -189,6 +189,7 @@ def test_controls_and_undo(opened):
     assert tab.get_attribute("#am-field", "aria-invalid") == "true"
     assert tiles(tab) == before
     tab.fill("#am-field", "140")
+    assert tiles(tab) == before
     assert tab.inner_text("#problem") == ""
     own = level(tab)
     tab.click("#tab-level")
