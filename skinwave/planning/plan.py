@@ -9,7 +9,7 @@ import numpy as np
 import fem
 from simple_model import Effort, ErrorPart, Statement
 from simple_model.layers.flat_body import TRANSFORM_RATE
-from simple_model.numbers import change_text, percent, significant
+from simple_model.numbers import change_text, percent, plural, significant
 from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Limit, Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
@@ -241,8 +241,8 @@ def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
     return highest, PlanRow(
         what="highest line",
         value=f"{highest:.0f} Hz",
-        reason=f"the load has {len(spectrum[0])} lines; higher ones move the probes by less "
-        f"than {percent(tolerance / 3)}",
+        reason=f"the load has {plural(len(spectrum[0]), 'line')}; higher ones move the probes by "
+        f"less than {percent(tolerance / 3)}",
     )
 
 
