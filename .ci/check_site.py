@@ -111,7 +111,7 @@ def unmoved(page: Any, folder: Path) -> Iterator[str]:
     page.goto(f"{address}#selftest")
     said = page.locator("#selftest-title", has_text="largest error")
     said.wait_for(timeout=120_000)
-    if not float(said.get_attribute("data-error")) < 0.01:
+    if said.get_attribute("data-failed") != "0":  # tests whose error exceeds the one stated
         yield f"waves: {said.inner_text()}"
     page.goto(f"{address}#x=10")
     page.reload()

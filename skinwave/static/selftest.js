@@ -37,7 +37,7 @@ export async function runSelftest(data, bodyOf, loadOf) {
   }
   title.textContent = rows.length ? `self-test: largest error ${(100 * largest).toFixed(2)} %`
     : "self-test: this page has no test data";
-  title.dataset.error = largest;
+  Object.assign(title.dataset, { error: largest, failed });
   document.getElementById("selftest-table").innerHTML =
     `<p>${rows.length - failed} of ${rows.length} Tactons agree with Python within the stated error. The
       error is the largest of all compared lines, relative to the line.</p>
