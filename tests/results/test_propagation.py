@@ -374,7 +374,7 @@ def test_the_verdict_over_tactons_counts_lines_and_states_medians():
     strongest = replace(first.effects["1"]["skin-slab"].strongest, name="2f_AM")
     other = replace(first.effects["1"]["skin-slab"], strongest=strongest)
     changed = dict(first.effects) | {"1": {"skin-slab": other}}
-    assert "in 1 of 3 Tactons" in overview.sentences(changed, groups)[1]
+    assert "In 1 of 3 Tactons" in overview.sentences(changed, groups)[1]
     bodies_only = {name: group[2:] for name, group in groups.items()}
     assert len(overview.sentences(changed, bodies_only)) == 1
     drawn = overview.figure(first.effects, REPORT)
