@@ -6,7 +6,7 @@ from dataclasses import replace
 from simple_model import MovingPressure, Tacton, Trajectory, published_load
 from skinwave.scene.scene import BODIES, Body, Scene, with_body
 
-MEASURED_ON = ("paper-sheet", "palm")  # the sheet that they measured, and skin
+MEASURED_ON = ("paper-sheet", "palm")  # a sheet as theirs may have been, and skin
 SIZES = {"palm": 4.5e-3}  # m, of elements within 3 % for every Tacton but stm30, 6 %
 
 
