@@ -11,6 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import starmap
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -542,6 +543,8 @@ def _component(component: Component | None, quantity: Quantity = DISPLACEMENT) -
 def _sensation_text(component: Component | None) -> str | None:
     if component is None or component.level is None:
         return None
+    if not isfinite(component.level):
+        return f"none (no threshold is known at {component.frequency:.0f} Hz)"
     return f"{round(component.level):+d} dB ({component.name}, {component.frequency:.0f} Hz)"
 
 

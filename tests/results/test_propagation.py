@@ -269,6 +269,13 @@ def test_spread_reach_and_delay_of_a_known_motion():
     assert mach_angle(6.0, 5.0) is None
 
 
+def test_lines_above_the_known_thresholds_have_no_level():
+    fast = MovingPressure(tacton=Tacton(am_frequency=1200, duration=0.05))
+    run = _run(Scene(pressure=fast, body=Body()), "flat-body-harmonic")
+    level = four_numbers(first_screen({"one": with_kernels(run)}, lambda run: ())).rows[0]
+    assert level[-1] == "none (no threshold is known at 1200 Hz)"
+
+
 def test_a_constant_pressure_at_rest_moves_nothing():
     still = MovingPressure(tacton=Tacton(duration=0.3))
     run = _run(Scene(pressure=still, body=Body()), "flat-body-harmonic")
