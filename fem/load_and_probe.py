@@ -277,7 +277,7 @@ def _facet_coordinates(facets: Floats, points: Floats, tolerance: float) -> tupl
     coordinates = np.full((len(points), 3), 1 / 3)
     size = np.ptp(facets, axis=1).max(axis=1, initial=0.0)
     distance, active = np.full(len(points), np.inf), np.arange(len(points))
-    newton_steps, newton_reach = 12, 3.0  # most steps; barycentric coordinate beyond which it stops
+    newton_steps, newton_reach = 12, 3.0  # it stops after 12 steps, or at a coordinate above 3
     edge_on_area = 1e-9  # of a facet's squared size: the projected area of a facet seen edge-on
     for _ in range(newton_steps):
         miss, tangents = _offsets(facets[active], coordinates[active], points[active])

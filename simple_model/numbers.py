@@ -97,7 +97,7 @@ def if_finite(value: float) -> float | None:
 
 
 def first_few(names: Sequence[str], most: int = 3) -> str:
-    """Format a list of names, of which at most a few are given.
+    """Format the first names of a list, and the number of the others.
 
     >>> first_few(["a", "b", "c"], 2)
     'a, b and 1 more'

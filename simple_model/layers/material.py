@@ -305,7 +305,7 @@ def tabulated(
     *, density: float, poisson: float, frequencies: ArrayLike, moduli: ArrayLike
 ) -> Material:
     """Return a material from its density in kg/m3, Poisson's ratio and measured complex shear
-    moduli (k,) in Pa at ascending frequencies (k,) in Hz, of which the first may be 0.
+    moduli (k,) in Pa at ascending frequencies (k,) in Hz. The first may be 0.
 
     Its modulus at rest is that at 0 Hz or that of the Prony series of the table. Raises a
     ValueError as `ModulusTable` does.

@@ -128,7 +128,7 @@ def _path_text(path: Trajectory) -> str:
 
 
 def _own_paths(tacton: Tacton, *, tolerance: float = 1e-8) -> tuple[Trajectory, ...]:
-    """Return the named shapes that a recorded path joins, one for each focus; () if there are none.
+    """Return the named shapes, one for each focus, that make a recorded path; () if none do.
 
     The path may differ from the shapes by a tolerance in m, and by the same share of its period.
     """
@@ -148,7 +148,7 @@ def _own_paths(tacton: Tacton, *, tolerance: float = 1e-8) -> tuple[Trajectory, 
 
 
 def _shape_of(corners: np.ndarray) -> Trajectory:
-    """Return the shape with corners (k, 2) in m, the first of which is repeated at the end."""
+    """Return the shape with corners (k, 2) in m. The last corner repeats the first."""
     sides = {1: "point", 2: "line", 3: "triangle", 4: "square", CORNERS_OF_CIRCLE: "circle"}
     shape = sides[len(corners) - 1]
     x, y = corners[:-1].mean(axis=0)

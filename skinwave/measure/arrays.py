@@ -316,7 +316,7 @@ def _number(arrays: Arrays, note: str) -> float:
 
 
 def _places(arrays: Arrays, farthest: float = 5.0) -> Floats:
-    """Return places (p, 2) in m from the first two coordinates; (0, 2) if there are none.
+    """Return places (p, 2) in m from the first two coordinates. Without places, p is 0.
 
     Beyond a distance `farthest` in m, the unit is not the metre.
     """

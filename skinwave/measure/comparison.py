@@ -56,7 +56,7 @@ class ModelColumn:
     model: np.ndarray  # (f, p) complex, its lines with gain and delay
     p_values: Floats  # (f, p), of differences, adjusted for their number (Holm); nan if unknown
     may_be_flipped: bool = False  # whether the opposite sign fits as well
-    significance: float = 0.05  # probability that any difference is declared where there is none
+    significance: float = 0.05  # probability of any false difference
 
     @property
     def differs(self) -> np.ndarray:
