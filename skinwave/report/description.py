@@ -6,7 +6,7 @@ import numpy as np
 
 from simple_model import MovingPressure, Tacton
 from simple_model.layers.material import Material
-from simple_model.numbers import plural
+from simple_model.numbers import first_few, plural
 from skinwave.bodies.supports import FRAME
 from skinwave.models import named
 from skinwave.report.figures import run_label
@@ -43,7 +43,7 @@ def unresolved_lines(runs: Iterable[Run], most: int = 4) -> list[str]:
     unresolved = {run.scene.tacton.duration: run.unresolved for run in runs if run.unresolved}
     return [
         f"A Tacton of {seconds:g} s is too short to resolve {plural(len(names), 'line')}: "
-        f"{', '.join(names[:most])}{' and others' * (len(names) > most)}. Use a longer Tacton."
+        f"{first_few(names, most)}. Use a longer Tacton."
         for seconds, names in unresolved.items()
     ]
 

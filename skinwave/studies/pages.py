@@ -21,7 +21,7 @@ from PIL import features
 
 from simple_model import Effort
 from simple_model.line_table import FREE
-from simple_model.numbers import interval, percent, significant
+from simple_model.numbers import first_few, interval, percent, significant
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.models import named
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
@@ -489,16 +489,11 @@ def _drive_sentence(first: FirstScreen) -> str:
     law = f"drive law and focus ({pressure.drive}, {pressure.profile_name})".replace("_", " ")
     text = f"{law.capitalize()} change the amplitudes of lines and add no line."
     if names := added_lines(kernel, published):
-        text = f"{law.capitalize()} add the lines {_first_names(names)} to the published load."
+        text = f"{law.capitalize()} add the lines {first_few(names)} to the published load."
     if not first.added:
         return f"{text} Linear propagation adds no line." if names else text
-    each = (f"{_first_names(own) or 'no line'} to the {label(c)}" for c, own in first.added.items())
+    each = (f"{first_few(own) or 'no line'} to the {label(c)}" for c, own in first.added.items())
     return f"{text} Stretching adds {', '.join(each)}. Linear propagation adds no line."
-
-
-def _first_names(names: Sequence[str]) -> str:
-    named = 3  # lines that a sentence names
-    return ", ".join(names[:named]) + " and others" * (len(names) > named)
 
 
 def _uncertainty(first: FirstScreen) -> str:
